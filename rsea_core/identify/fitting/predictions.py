@@ -44,10 +44,14 @@ class Windows:
         First and last row of each; together all rows, each once.
     motion : (n, 5) array
         Current, wheel angle and speed, load angle and speed.
+    link_carried : bool
+        Whether a flexible link swings along the motion to each window's start, or starts
+        undeflected (`undeflect_link`).
     """
 
     rows: NDArray
     motion: NDArray
+    link_carried: bool = False
 
 
 def predict_readings(
@@ -169,4 +173,17 @@ def _window_starts(replay: Replay, numbers: Sequence[Numbers], windows: Windows)
     carried = [j for j, n in enumerate(numbers) if n.fx[list(CARRIED)].any()]
     if carried:
         y[carried] = replay.warm_at([numbers[j] for j in carried], motion, first)
+    if not windows.link_carried:
+        undeflect_link(y)
     return y
+
+
+def undeflect_link(y: NDArray) -> None:
+    """Let the flexible link of start states (..., N_STEP_STATES) start with the load.
+
+    Integrated along the smoothed motion, its swing takes up the errors of that motion. In the short
+    runs of the free-run search a hysteresis of the spring was then taken for a link (practice-wide
+    x32).
+    """
+    for load, link in (LOAD_STATES, LOAD_SPEEDS):
+        y[..., link] = y[..., load]

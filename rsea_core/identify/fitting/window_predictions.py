@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.variant import TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
-from rsea_core.identify.fitting.predictions import LOAD_SPEEDS, LOAD_STATES, shift_starts
+from rsea_core.identify.fitting.predictions import shift_starts, undeflect_link
 from rsea_core.identify.fitting.problem import Bench, Problem
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 
@@ -106,10 +106,7 @@ def predict_many(
     windows = piece.windows if windows is None else windows
     numbers = [Numbers(d.plant, d.regions, d.fx) for d in machines]
     starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
-    # a link starts undeflected: integrated along the smoothed motion it takes up that motion's
-    # errors, and a hysteresis of the spring was taken for a link (practice-wide x32)
-    for load, link in (LOAD_STATES, LOAD_SPEEDS):
-        starts[..., link] = starts[..., load]
+    undeflect_link(starts)
     for y, d in zip(starts, machines, strict=True):  # the smoothed motion is what sensors read
         shift_starts(y, d, bench.where.ratio)
     runs = replay.run_windows(numbers, windows, starts, failures="nan", parallel=len(numbers) > 1)

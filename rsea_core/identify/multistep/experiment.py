@@ -135,7 +135,7 @@ class Experiment:
         last = np.append(first[1:] - 1, (n - 1) * k)
         at = np.arange((n - 1) * k + 1) / k
         motion = np.stack([np.interp(at, np.arange(n), c) for c in windows.motion.T], axis=1)
-        return Windows(rows=np.stack([first, last], axis=1), motion=motion)
+        return replace(windows, rows=np.stack([first, last], axis=1), motion=motion)
 
 
 def experiment(

@@ -82,7 +82,8 @@ def windows_of(rows: int, length: int, motion: NDArray, block: int = 1) -> Windo
     blocks = rows // block
     first = block * np.unique(np.linspace(0, blocks, count + 1)[:-1].astype(int))
     last = np.append(first[1:] - 1, rows - 1)
-    return Windows(rows=np.stack([first, last], axis=1), motion=motion)
+    rows = np.stack([first, last], axis=1)
+    return Windows(rows=rows, motion=motion, link_carried=True)
 
 
 def prepared(track: Track, **changes) -> Track:
