@@ -7,7 +7,7 @@ import numpy as np
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.identify.clamped_loads import with_yielding_clamps
-from rsea_core.identify.law_search.search import investigate
+from rsea_core.identify.law_search.investigate import investigate
 from rsea_core.identify.multistep.command_timing import RowTimes
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, RATIO

@@ -37,7 +37,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     with_richer_rivals,
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
-from rsea_core.identify.law_search.hold_out import with_moving_loads
+from rsea_core.identify.law_search.gear_mesh import MESH_DAMPER, first_laws
 from rsea_core.identify.law_search.longer_windows import lengthened
 from rsea_core.identify.law_search.pruning import pruned, without_weak_end
 from rsea_core.identify.law_search.pulses import pulse_ratio
@@ -49,8 +49,6 @@ from rsea_core.identify.multistep.criteria import (
     ARRIVALS,
     ARRIVED,
     CONTENDS,
-    DOUBTED_ERROR,
-    DOUBTED_SHARE,
     FEWER_FINISHED,
     FINISHED,
     FORMS,
@@ -66,16 +64,13 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSE_RATIO,
     SECOND_STARTS,
-    TIMING_SHARE,
     WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import (
     likelier,
     parameters_with_timing,
-    relative_error,
     smooth,
-    with_better_timing,
     with_fine_steps,
 )
 from rsea_core.identify.multistep.log_nuisances import nuisances
@@ -85,93 +80,61 @@ from rsea_core.recordings.case import Case
 HOLDS_NO_CLAIM = (DriveDelay.effect, SensorNoise.effect)  # nuisances, or no physics
 
 
-def investigate(
-    case: Case, *, quick: bool = False, say: Callable[[str], None] = lambda _: None
-) -> Found:
-    """Search for what a case's recordings show.
+def searched(
+    case: Case, timing: CommandTiming | None, say, *, quick: bool = False,
+    mesh: tuple[Law, ...] = (),
+) -> Found:  # fmt: skip
+    """The search under one timing of the command; None: that which parameters alone prefer.
 
     Parameters
     ----------
-    quick : bool
-        Finish fewer candidates, each from one start.
+    mesh : tuple of Law
+        Free values of a gear's mesh that stands for a spring: the first law is in the gear.
     """
-    case, shared = with_moving_loads(case)
-    for file in shared:
-        say(f"{file}: two thirds are fitted: no other recording lets the load move")
-    found = _searched(case, None, say, quick=quick)
-    if found.steps and not quick:
-        found = _better_search(found, _begun_by_contender(found, say))
-        # a missing law can pass for another timing of the command
-        own, fit = with_better_timing(found.estimator, found.best, case, say)
-        timing, gain = own.problem.timing, found.best.cost - fit.cost
-        if gain > TIMING_SHARE * min(step.gain for step in found.steps):
-            say("searched again: with the laws found, commands act at other times")
-            again = _searched(case, timing, say, quick=quick)
-            found = _better_search(found, _begun_by_contender(again, say), again)
-    found.shared = shared
-    return found
-
-
-def _doubtful(found: Found) -> bool:
-    """Whether laws leave a machine that is not predictable, or innovations that depend."""
-    own, best = found.estimator, found.best
-    error = relative_error(own, best.hypothesis, best.x)
-    return found.horizon is not None or own.tempering < DOUBTED_SHARE or error > DOUBTED_ERROR
-
-
-def _begun_by_contender(found: Found, say) -> Found:
-    """A search that begins with the first law's contender; the one given where none is in doubt."""
-    contender = found.steps[0].contender if found.steps else None
-    if contender is None or not _doubtful(found):
-        return found
-    say(f"searched again: {contender.key} first, whose innovations are more independent")
-    other = found.without_laws()
-    _add_all(other, [w for w in _laws(other) if w.effect == contender.effect], say)
-    other.screened = found.screened  # of all laws, for the nearest names
-    return other if other.steps else found
-
-
-def _better_search(*searches: Found) -> Found:
-    """The search whose model predicts for longest; of equals the likeliest one."""
-    lengths = [np.inf if f.horizon is None else f.horizon for f in searches]
-    ends = [f for f, n in zip(searches, lengths, strict=True) if n == max(lengths)]
-    _, best = likelier(*((f.estimator, f.best) for f in ends))
-    return next(f for f in ends if f.best is best)
-
-
-def _searched(case: Case, timing: CommandTiming | None, say, *, quick: bool) -> Found:
-    """The search under one timing of the command; None: that which parameters alone prefer."""
-    h = Hypothesis(laws=nuisances(case))
-    estimator, base, horizon = parameters_with_timing(case, h, say, timing=timing, quick=quick)
+    h = Hypothesis(laws=(*nuisances(case), *mesh))
+    estimator, base, horizon = parameters_with_timing(
+        case, h, say, timing=timing, quick=quick or bool(mesh)
+    )
     estimator, base = with_fine_steps(estimator, base, case, say)
     if not quick:
         estimator, base = settled(estimator, base)
     problem = estimator.problem
     found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
                   best=base, horizon=horizon, base_horizon=horizon)  # fmt: skip
-    _add_all(found, _laws(found), say, quick=quick)
+    laws = laws_of(found)
+    add_all(found, first_laws(laws) if mesh else laws, say, quick=quick, further=not mesh)
     return found
 
 
-def _laws(found: Found) -> list[Law]:
+def laws_of(found: Found) -> list[Law]:
     """Every law that the case can have and its rows can show."""
+    meshes = any(law.effect == MESH_DAMPER for law in found.base.hypothesis.laws)
     return [
         law for law in catalogue(found.problem.case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM and not law.follows
+        and not (meshes and law.subsystem == "spring")
         and _observable(law, found.base_estimator)
     ]  # fmt: skip
 
 
-def _add_all(found: Found, first: Sequence[Law], say, *, quick: bool = False) -> None:
-    """Add laws, the first one of those given, as long as one is worth it; then shapes are tried."""
-    laws = _laws(found)
+def add_all(
+    found: Found, first: Sequence[Law], say, *, quick: bool = False, further: bool = True
+) -> None:
+    """Add laws, the first one of those given, as long as one is worth it; then shapes are tried.
+
+    Parameters
+    ----------
+    further : bool
+        Look for further laws as thoroughly as for the first: a stiff mesh costs short steps.
+    """
+    laws = laws_of(found)
     step = _next_law(found, first, say, quick=quick)
     if step is not None:
         found.steps.append(step)
         lengthened(found, say, quick=quick)
-        _add_laws(found, laws, say, quick=quick)
+        _add_laws(found, laws, say, quick=quick or not further)
     if pruned(found, say):  # the first law hid others: what is left may be found now
-        _add_laws(found, laws, say, quick=quick)
+        _add_laws(found, laws, say, quick=quick or not further)
         pruned(found, say)
     without_weak_end(found)
     found.base_shapes = found.shapes = shapes(Projection(found.base_estimator, found.base))

@@ -1,0 +1,84 @@
+"""What a case's recordings show: one search, and others where its end is in doubt.
+
+Each further search begins elsewhere: with a law whose innovations are more independent, at other
+times of the commands, or with the gear's mesh in place of a rigid train. The one whose model
+predicts for longest stands, of equals the likeliest (docs/diagnosis.md 10.4).
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
+from rsea_core.identify.law_search.hold_out import with_moving_loads
+from rsea_core.identify.law_search.search import add_all, laws_of, searched
+from rsea_core.identify.multistep.criteria import DOUBTED_ERROR, DOUBTED_SHARE, TIMING_SHARE
+from rsea_core.identify.multistep.horizons import likelier, relative_error, with_better_timing
+from rsea_core.recordings.case import Case
+
+
+def investigate(
+    case: Case, *, quick: bool = False, say: Callable[[str], None] = lambda _: None
+) -> Found:
+    """Search for what a case's recordings show.
+
+    Parameters
+    ----------
+    quick : bool
+        Finish fewer candidates, each from one start.
+    """
+    case, shared = with_moving_loads(case)
+    for file in shared:
+        say(f"{file}: two thirds are fitted: no other recording lets the load move")
+    found = searched(case, None, say, quick=quick)
+    if found.steps and not quick:
+        found = _better_search(found, _begun_by_contender(found, say))
+        # a missing law can pass for another timing of the command
+        own, fit = with_better_timing(found.estimator, found.best, case, say)
+        timing, gain = own.problem.timing, found.best.cost - fit.cost
+        if gain > TIMING_SHARE * min(step.gain for step in found.steps):
+            say("searched again: with the laws found, commands act at other times")
+            again = searched(case, timing, say, quick=quick)
+            found = _better_search(found, _begun_by_contender(again, say), again)
+    if not quick and encoders_disagree(found):
+        found = _better_search(found, _through_gear_mesh(case, found, say))
+    found.shared = shared
+    return found
+
+
+def _through_gear_mesh(case: Case, found: Found, say) -> Found:
+    """A search with the gear's mesh as a spring; the one given where no backlash is found so."""
+    elastic = with_gear_mesh(case)
+    if elastic is None:
+        return found
+    say("searched again: the encoders of a rigid train disagree; its gear's mesh yields now")
+    other = searched(elastic[0], found.problem.timing, say, mesh=elastic[1])
+    return other if other.steps else found
+
+
+def _doubtful(found: Found) -> bool:
+    """Whether laws leave a machine that is not predictable, or innovations that depend."""
+    own, best = found.estimator, found.best
+    error = relative_error(own, best.hypothesis, best.x)
+    return found.horizon is not None or own.tempering < DOUBTED_SHARE or error > DOUBTED_ERROR
+
+
+def _begun_by_contender(found: Found, say) -> Found:
+    """A search that begins with the first law's contender; the one given where none is in doubt."""
+    contender = found.steps[0].contender if found.steps else None
+    if contender is None or not _doubtful(found):
+        return found
+    say(f"searched again: {contender.key} first, whose innovations are more independent")
+    other = found.without_laws()
+    add_all(other, [w for w in laws_of(other) if w.effect == contender.effect], say)
+    other.screened = found.screened  # of all laws, for the nearest names
+    return other if other.steps else found
+
+
+def _better_search(*searches: Found) -> Found:
+    """The search whose model predicts for longest; of equals the likeliest one."""
+    lengths = [np.inf if f.horizon is None else f.horizon for f in searches]
+    ends = [f for f, n in zip(searches, lengths, strict=True) if n == max(lengths)]
+    _, best = likelier(*((f.estimator, f.best) for f in ends))
+    return next(f for f in ends if f.best is best)
