@@ -79,7 +79,8 @@ class SeriesBacklash(Term):
             return ()
         return (
             Law(effect=cls.effect, law="play in series", subsystem="gear", write=_write, kind=cls,
-                unknowns=(width,), starts=tuple((s * deflection,) for s in WIDTHS + LARGE_WIDTHS)),
+                unknowns=(width,), starts=tuple((s * deflection,) for s in WIDTHS + LARGE_WIDTHS),
+                richer=("play",)),
         )  # fmt: skip
 
     @classmethod

@@ -1,0 +1,135 @@
+"""Backlash in a train without a spring: the gear's mesh stands for the spring that it lacks."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from rsea_core.effects.gear_backlash import GearBacklash
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.gear_mesh import (
+    encoders_disagree,
+    first_laws,
+    with_gear_mesh,
+)
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.horizons import parameters
+from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.recordings.case import read_case
+
+ROW_s, ROWS, FINER = 2e-3, 1500, 200
+RATIO, MOTOR, LOAD, DAMPING = 50.0, 4e-3, 3e-3, 8e-3  # both inertias at the output, kgm2, Nms/rad
+WIDTH = 0.04  # rad at the output
+CONSTANT, OHM, VOLTS = 0.02, 2.5, 12.0
+RIG = f"""[rig]
+name = "train"
+parts = ["drive", "gear", "load"]
+supply_voltage_V = {VOLTS}
+terminal_resistance_ohm = {OHM}
+torque_constant_Nm_per_A = {CONSTANT}
+back_emf_constant_Vs_per_rad = {CONSTANT}
+motor_inertia_kgm2 = {MOTOR / RATIO**2}
+motor_viscous_Nms_per_rad = {DAMPING / RATIO**2}
+gear_ratio = {RATIO}
+load_inertia_kgm2 = {LOAD}
+load_viscous_Nms_per_rad = 1e-4
+motor_encoder_counts_per_rev = 2048
+load_encoder_counts_per_rev = 4096
+
+[[recording]]
+file = "a.csv"
+load = "free"
+"""
+
+
+def simulated(width: float) -> np.ndarray:
+    """Duty and true angles of motor and load (n, 3): two bodies, teeth with a damper, by hand."""
+    time = np.arange(ROWS) * ROW_s
+    duty = 0.3 * np.sin(2 * np.pi * 0.7 * time) + 0.2 * np.sin(2 * np.pi * 1.9 * time + 1.0)
+    stiff = LOAD * (2 * np.pi * 60.0) ** 2
+    drag, h = 0.2 * math.sqrt(stiff * LOAD), ROW_s / FINER
+    motor = load = motor_speed = load_speed = 0.0
+    out = np.zeros((ROWS, 3))
+    for row, u in enumerate(duty):
+        out[row] = u, motor * RATIO, load
+        for _ in range(FINER):
+            twist, rate = motor - load, motor_speed - load_speed
+            beyond = max(abs(twist) - 0.5 * width, 0.0)
+            teeth = math.copysign(max(stiff * beyond, 0.0), twist) + (
+                drag * rate if beyond else 0.0
+            )
+            current = (u * VOLTS - CONSTANT * RATIO * motor_speed) / OHM
+            motor_speed += h * (CONSTANT * RATIO * current - DAMPING * motor_speed - teeth) / MOTOR
+            load_speed += h * (teeth - 1e-4 * load_speed) / LOAD
+            motor, load = motor + h * motor_speed, load + h * load_speed
+    return out
+
+
+@pytest.fixture(scope="module")
+def cases(tmp_path_factory):
+    """The train with backlash, and without."""
+    found = {}
+    for width in (WIDTH, 0.0):
+        folder = tmp_path_factory.mktemp("train")
+        duty, motor, load = simulated(width).T
+        steps = 2 * np.pi / np.array([2048, 4096])
+        read = np.round(np.stack([motor, load], axis=1) / steps + 0.3) * steps
+        table = np.column_stack([np.arange(ROWS) * ROW_s, duty, read])
+        names = "time_s,duty,motor_angle_rad,load_angle_rad"
+        np.savetxt(folder / "a.csv", table, delimiter=",", header=names, comments="")
+        (folder / "rig.toml").write_text(RIG)
+        found[width] = read_case(folder)
+    return found
+
+
+def parameters_alone(case, more=()) -> Found:
+    h = Hypothesis(laws=(*nuisances(case), *more))
+    own, base, horizon = parameters(MultistepProblem(case), h, lambda _: None)
+    return Found(problem=own.problem, base_estimator=own, base=base, estimator=own, best=base,
+                 horizon=horizon)  # fmt: skip
+
+
+def test_encoders_of_a_rigid_train_disagree_with_backlash_alone(cases):
+    assert encoders_disagree(parameters_alone(cases[WIDTH]))
+    assert not encoders_disagree(parameters_alone(cases[0.0]))
+
+
+def test_the_mesh_with_both_inertias_has_a_mode_of_four_rows(cases):
+    elastic, (damper,) = with_gear_mesh(cases[WIDTH])
+    stiffness = elastic.rig.spring_stiffness_Nm_per_rad
+    mode_Hz = math.sqrt(stiffness * (1 / MOTOR + 1 / LOAD)) / (2 * math.pi)
+    assert mode_Hz == pytest.approx(1.0 / (4 * ROW_s))
+    assert damper.nuisance
+    assert elastic.rig.has("spring")
+    assert not cases[WIDTH].rig.has("spring")
+
+
+def test_no_mesh_joins_a_body_without_inertia(cases):
+    case = cases[WIDTH]
+    rig = SimpleNamespace(**{name: getattr(case.rig, name) for name in ("gear_ratio", "has")})
+    rig.motor_inertia_kgm2, rig.output_inertia_kgm2, rig.load_inertia_kgm2 = 1e-6, 0.0, None
+    assert with_gear_mesh(SimpleNamespace(rig=rig)) is None
+
+
+def test_backlash_before_the_mesh_predicts_what_no_rigid_train_does(cases):
+    elastic, damper = with_gear_mesh(cases[WIDTH])
+    rigid, whole = parameters_alone(cases[WIDTH]), parameters_alone(elastic, damper)
+    law = next(
+        law for law in first_laws(list(catalogue(elastic, relative=True).values()))
+        if law.law == "play"
+    )  # fmt: skip
+    assert law.effect == GearBacklash.effect
+    h = Hypothesis(laws=(*whole.base.hypothesis.laws, law))
+    start = np.append(whole.base.x, 0.8 * WIDTH / law.unknowns[0].scale)
+    fit = whole.estimator.fit(h, start)
+    width = fit.x[-1] * law.unknowns[0].scale
+    assert width == pytest.approx(WIDTH, rel=0.05)
+
+    def error(estimator, hypothesis, x):
+        return np.sqrt(np.mean(estimator.residuals([(hypothesis, x)])[0][0][:, 1] ** 2))
+
+    before = error(rigid.estimator, rigid.base.hypothesis, rigid.base.x)
+    assert error(whole.estimator, h, fit.x) < 0.3 * before
