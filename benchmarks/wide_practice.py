@@ -19,7 +19,9 @@ from pathlib import Path
 from rsea_core.errors import RseaError
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
-from rsea_core.recordings.case import read_case, read_test
+from rsea_core.identify.spring_bench.diagnose import diagnose_bench, is_spring_bench
+from rsea_core.model.model_file import model_to_toml
+from rsea_core.recordings.case import Case, read_case, read_test
 
 
 def run_case(folder: Path, out: Path) -> str:
@@ -27,20 +29,29 @@ def run_case(folder: Path, out: Path) -> str:
     begun, target = time.perf_counter(), out / folder.name
     target.mkdir(parents=True, exist_ok=True)
     try:
-        found = diagnose(read_case(folder))
-        (target / "diagnosis.json").write_text(json.dumps(found.document), encoding="utf-8")
+        document, model_toml = _diagnosed(read_case(folder))
+        (target / "diagnosis.json").write_text(json.dumps(document), encoding="utf-8")
         path = target / "model.toml"
-        path.write_text(found.model.to_toml(), encoding="utf-8")
+        path.write_text(model_toml, encoding="utf-8")
         model = FoundModel.from_toml(path)
         for test in read_test(folder / "test", model.rig):
             write_prediction(model, test, target / "prediction.csv")
     except RseaError as refused:
         return f"{folder.name}: {refused}"
     named = ", ".join(
-        f"{e['name']} ({e['confidence']:.2f})" for e in found.document["effects"]
+        f"{e['name']} ({e['confidence']:.2f})" for e in document["effects"]
     )  # fmt: skip
     seconds = time.perf_counter() - begun
-    return f"{folder.name}: {found.document['verdict']}: {named or '-'}; {seconds:.1f} s"
+    return f"{folder.name}: {document['verdict']}: {named or '-'}; {seconds:.1f} s"
+
+
+def _diagnosed(case: Case) -> tuple[dict, str]:
+    """`diagnosis.json` and `model.toml` of a machine, or of a spring on a bench."""
+    if is_spring_bench(case):
+        bench = diagnose_bench(case)
+        return bench.document(), model_to_toml(bench.model())
+    found = diagnose(case)
+    return found.document, found.model.to_toml()
 
 
 def main() -> int:

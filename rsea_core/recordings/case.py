@@ -300,6 +300,8 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
     name = _word(table, "file", where)
     load = _load(table, where)
     optional = (*COMMANDS, "current_A", "load_angle_rad", "supply_V", "drive_enabled")
+    if rig.parts == ("spring",):
+        optional = ("load_angle_rad", "spring_deflection_rad")
     columns = read_columns(folder / name, RecordingError, required=("time_s",), optional=optional)
     given = [column for column in (*COMMANDS, "current_A") if column in columns]
     if rig.has("drive") and not given:
@@ -309,6 +311,8 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
     if given:
         values["current_command_A" if given[0] == "current_A" else given[0]] = columns[given[0]]
     if load.kind == "imposed":
+        if "spring_deflection_rad" in columns and "load_angle_rad" not in columns:
+            columns["load_angle_rad"] = -columns["spring_deflection_rad"]  # its hub is held
         if "load_angle_rad" not in columns:
             raise RecordingError(f'{folder / name}: load "imposed" needs load_angle_rad')
         values["load_angle_rad"] = columns["load_angle_rad"]

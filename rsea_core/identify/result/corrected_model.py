@@ -124,7 +124,11 @@ class FoundModel:
         finer = FINER if linear and inputs.command_name else 1
         if finer > 1:
             inputs, more = between_rows(inputs, more, finer)
-        replay = Replay.of(inputs, **more)
+        if self.rig.parts == ("spring",) and inputs.load_angle_rad is not None:
+            # nothing else moves: the hub is held, and the deflection is given
+            replay = Replay(time_s=inputs.time_s, spring_deflection_rad=-inputs.load_angle_rad)
+        else:
+            replay = Replay.of(inputs, **more)
         base = replay.numbers(ActuatorModel(self.rig, self.terms))
         warm, left = 0.0, None
         if test.initial_temperature_C is not None:
@@ -156,7 +160,8 @@ class FoundModel:
         columns = {"time_s": np.array(test.inputs.time_s)}
         for j, name in enumerate(PREDICTED):
             part = {"motor_angle_rad": "gear", "torque_Nm": "spring"}.get(name)
-            if part is None or self.rig.has(part):
+            moves = name == "torque_Nm" or self.rig.parts != ("spring",)
+            if moves and (part is None or self.rig.has(part)):
                 columns[name] = reading(self.terms, name, columns["time_s"], readings[:, j])
         return columns
 
