@@ -258,16 +258,24 @@ class MultistepProblem(Problem):
     def _scaled(self, n: Nominal) -> Nominal:
         """A damping that the rig file gives as none or leaves out, free upwards in its own scale.
 
-        That of the machine: the inertia that it slows down, over the time that the motion shows.
+        That of the machine: the inertia that it slows down, over the time that the motion shows,
+        and the damping that the back-EMF gives to the body that the motor moves.
         """
         if not _free(n):
             return n
         plant, ratio = machine_of(self.fitted[0].base), self.fitted[0].where.ratio
-        inertia = plant.load_inertia if n.key.startswith("load") else plant.inertia
+        of_load = n.key.startswith("load")
+        inertia, electric = plant.load_inertia if of_load else plant.inertia, 0.0
         inertia = inertia or plant.inertia or plant.load_inertia
+        one_body = plant.structure in (mp.RIGID_FREE, mp.RIGID_HELD)
+        if of_load and one_body:
+            inertia = plant.inertia + plant.load_inertia
+        by_volts = plant.drive in (mp.DUTY, mp.VOLTAGE) and plant.resistance > 0.0
+        if by_volts and (one_body or not of_load):
+            electric = plant.torque_per_ampere * plant.volts_per_speed / plant.resistance
         side = ratio**2 if n.key.startswith("motor") else 1.0
         rate = max(_motion_rate(e.recording) for e in self.fitted)
-        return replace(n, tolerance=DAMPED * inertia * rate / side)
+        return replace(n, tolerance=DAMPED * (inertia * rate + electric) / side)
 
     def bounds(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
         """Lowest and highest unknowns: what is stated stays near, no damping below zero."""
