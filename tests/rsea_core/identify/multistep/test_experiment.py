@@ -1,0 +1,43 @@
+"""What is free in a case's experiments: dampings that the rig file leaves out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_core.identify.multistep.experiment import DAMPED, MultistepProblem
+from rsea_core.machine.rig import Rig
+from tests.cases.one_axis import ROW_s, axis_case, axis_recording
+
+RATIO, CONSTANT, OHM = 70.0, 0.008, 3.0
+SERVO = Rig(
+    name="servo", parts=("drive", "gear", "load"), supply_voltage_V=15.0,
+    torque_constant_Nm_per_A=CONSTANT, back_emf_constant_Vs_per_rad=CONSTANT,
+    terminal_resistance_ohm=OHM, motor_inertia_kgm2=5e-7, motor_viscous_Nms_per_rad=1e-7,
+    gear_ratio=RATIO, load_inertia_kgm2=1e-3,
+)  # fmt: skip
+
+
+def load_damping(folder, rig: Rig, command: str) -> float:
+    """One deviation of the damping that the file leaves out, of a log by this command."""
+    given = axis_recording(seed=1)
+    columns = {name: v for name, v in given.columns.items() if name != "current_command_A"}
+    columns[command] = given["current_command_A"]
+    case = axis_case(folder, replace(given, columns=columns), rig=rig)
+    return next(
+        n.tolerance for n in MultistepProblem(case).nominals
+        if n.key == "load_viscous_Nms_per_rad"
+    )  # fmt: skip
+
+
+def test_a_damping_left_out_may_be_as_large_as_that_of_the_back_emf_on_the_same_body(tmp_path):
+    by_volts = load_damping(tmp_path, SERVO, "voltage_V")
+    by_current = load_damping(tmp_path, SERVO, "current_command_A")
+    electric = CONSTANT**2 / OHM * RATIO**2
+    assert by_volts - by_current == pytest.approx(DAMPED * electric)
+    # of one body the inertia is that of motor and load: at most the fastest motion that rows show
+    whole = 1e-3 + 5e-7 * RATIO**2
+    assert 0.0 < by_current < DAMPED * whole * np.pi / ROW_s
+    stiff = replace(SERVO, motor_inertia_kgm2=5e-5)
+    ratio = load_damping(tmp_path, stiff, "current_command_A") / by_current
+    assert ratio == pytest.approx((1e-3 + 5e-5 * RATIO**2) / whole)
