@@ -62,6 +62,7 @@ from rsea_core.identify.multistep.criteria import (
     OWED,
     PARENT,
     PER_VALUE,
+    PULSE_CHOICE,
     PULSE_RATIO,
     SECOND_STARTS,
     WEAK,
@@ -272,7 +273,8 @@ def _worth_over_parent(found: Found, finished: Sequence[Entry]) -> Callable[[Ent
     def worth(entry: Entry) -> float:
         c, own, fit = entry
         gain = gain_of(own, base, fit, share) - cost_of_mass(found.problem, entry)
-        return gain - PER_VALUE * count_values(c.law)
+        chosen = PULSE_CHOICE if c.law.only is not None else 0.0
+        return gain - PER_VALUE * count_values(c.law) - chosen
 
     return worth
 

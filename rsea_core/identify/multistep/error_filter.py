@@ -8,7 +8,7 @@ a torque that no log holds does not pass for physics, and the readings' noise wi
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -38,11 +38,21 @@ class Noise:
         mean over a row as a share of its change to the next one: a loop that runs faster than its
         log, a command that acts late.
     readings : (p,) array
-        Standard deviation of one reading.
+        Standard deviation of one reading, of what is independent from row to row.
+    colours : (p,) array
+        Of what each reading errs by over `colour_time_s`, an autoregression of first order; empty
+        where readings have white noise.
     """
 
     inputs: NDArray
     readings: NDArray
+    colours: NDArray = field(default_factory=lambda: np.zeros(0))
+    colour_time_s: float = 0.0
+
+    @property
+    def sizes(self) -> NDArray:
+        """(5 or 5 + p,) deviations of all that drives the errors."""
+        return np.concatenate([self.inputs, self.colours])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +77,8 @@ class Scale:
 class LinearErrors(NamedTuple):
     """A (modes, d, d), Q (modes, d, d), mode (n,), C (p, d), start (d,) of standard deviations.
 
-    After the machine's states comes a slow torque at the gear, where there is a wheel; the last
-    states are constants of the readings.
+    After the machine's states comes a slow torque at the gear, where there is a wheel, then
+    constants of the readings; the last states are their coloured noise.
     """
 
     A: NDArray
@@ -77,8 +87,9 @@ class LinearErrors(NamedTuple):
     C: NDArray
     states: tuple[int, ...]
     constants: NDArray  # (p,) index of each reading's constant, -1: none
-    unit: NDArray  # (5, modes, d, d): Q of an unknown input of size one
+    unit: NDArray  # (5 or 5 + p, modes, d, d): Q of an unknown input of size one
     slow: int  # index of the slow torque, -1: none
+    colours: NDArray  # (p or 0,) index of each reading's coloured noise
 
 
 def linear_errors(
@@ -107,17 +118,23 @@ def linear_errors(
     slow = n if k.WW in states else -1
     constants[later] = n + (slow >= 0) + np.arange(len(later))
     d = n + (slow >= 0) + len(later)
+    colours = d + np.arange(noise.colours.size)
+    d += colours.size
     slope = np.cos(load_angle + plant.gravity_offset)
     mode = np.clip(
         np.round((slope + 1.0) * 0.5 * (GRAVITY_LEVELS - 1)), 0, GRAVITY_LEVELS - 1
     ).astype(np.int64)
     contact = load_angle > plant.contact_angle
     mode = mode + GRAVITY_LEVELS * contact
-    A, unit = np.zeros((2 * GRAVITY_LEVELS, d, d)), np.zeros((5, 2 * GRAVITY_LEVELS, d, d))
+    A = np.zeros((2 * GRAVITY_LEVELS, d, d))
+    unit = np.zeros((5 + colours.size, 2 * GRAVITY_LEVELS, d, d))
     densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
     densities += [np.zeros((d, d)), _command(plant, states, row_s, d)]
     if slow >= 0:  # of the size in the long run
         densities[3][slow, slow] = 2.0 / (SLOW * time_s)
+    for at in colours:
+        densities.append(np.zeros((d, d)))
+        densities[-1][at, at] = 2.0 / noise.colour_time_s
     for j in np.unique(mode):
         level = -1.0 + 2.0 * (j % GRAVITY_LEVELS) / (GRAVITY_LEVELS - 1)
         full = linear_plant(
@@ -131,14 +148,17 @@ def linear_errors(
         if slow >= 0:
             M[states.index(k.WW), slow] = 1.0 / _wheel(plant)
             M[slow, slow] = -1.0 / (SLOW * time_s)
+        for at in colours:
+            M[at, at] = -1.0 / noise.colour_time_s
         for m, density in enumerate(densities):
             A[j], unit[m, j] = discretised(M, density, row_s)
     A, unit, mode = _with_levels(A, unit, mode, command_change)
     C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
     for j in later:
         C[j, constants[j]] = 1.0
-    Q = np.tensordot(noise.inputs**2, unit, axes=1)
-    return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow)
+    C[np.arange(colours.size), colours] = 1.0
+    Q = np.tensordot(noise.sizes**2, unit, axes=1)
+    return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow, colours)
 
 
 def _with_levels(A: NDArray, unit: NDArray, mode: NDArray, change: NDArray):
@@ -184,7 +204,7 @@ def _command(plant: mp.Plant, states: Sequence[int], row_s: float, d: int) -> ND
 
 def with_density(errors: LinearErrors, noise: Noise) -> LinearErrors:
     """The errors' machine under other unknown inputs."""
-    return errors._replace(Q=np.tensordot(noise.inputs**2, errors.unit, axes=1))
+    return errors._replace(Q=np.tensordot(noise.sizes**2, errors.unit, axes=1))
 
 
 def _reading(plant: mp.Plant, stiffness: float, name: str, states: Sequence[int], d: int):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.coloured_noise import with_coloured_readings
 from rsea_core.identify.multistep.command_timing import (
     AS_LOGGED,
     CommandTiming,
@@ -192,6 +193,7 @@ def _grown(
         x, estimator, kept, known = fit.x, trial, horizon, True
         smooth(estimator, h, x)
     estimator = with_noise(estimator.having(with_windows(estimator, kept)), h, x)
+    estimator = with_coloured_readings(estimator, h, x, say)
     plain = estimator.fit(h, x)
     fit = _with_best_delay(estimator, h, plain.x)  # short windows hardly show one
     late = fit.cost < plain.cost - LINEAR_GAIN

@@ -43,7 +43,10 @@ def estimated_noise(
         for j, _ in free_inputs(machine_of(t.experiment.base), t.experiment.channels)
     }
     keys: list[tuple] = [("input", j) for j in sorted(free)]
-    keys += [("reading", c) for c in sorted({c for t in tracks for c in t.experiment.channels})]
+    read = sorted({c for t in tracks for c in t.experiment.channels})
+    keys += [("reading", c) for c in read]
+    if tracks[0].noise.colours.size:
+        keys += [("colour", c) for c in read]
     noises = [t.noise for t in tracks]
     values = _likelihoods(parts, noises)
     for factor in steps:
@@ -119,8 +122,12 @@ def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
         return replace(noise, inputs=inputs)
     if at not in track.experiment.channels:
         return noise
-    readings = noise.readings.copy()
     j = track.experiment.channels.index(at)
+    if kind == "colour":
+        colours = noise.colours.copy()
+        colours[j] *= factor
+        return replace(noise, colours=colours)
+    readings = noise.readings.copy()
     least = 0.5 * track.experiment.floor_of_each[j] / track.block**0.5
     readings[j] = max(readings[j] * factor, least)
     return replace(noise, readings=readings)

@@ -119,6 +119,7 @@ def start_variances(t: Track, errors: LinearErrors) -> NDArray:
     for j, at in enumerate(errors.constants):
         if at >= 0:
             start[:, at] = t.experiment.floor_of_each[j] ** 2
+    start[:, errors.colours] = t.noise.colours**2
     return np.maximum(start, 1e-30)
 
 
@@ -161,7 +162,8 @@ def initial_track(e: Experiment, block: int = 1) -> Track:
         at = e.channels.index("current_A")
         noise.readings[at] = max(noise.readings[at], _current_error(e, motion))
     spread = np.tile(_extent(scale, motion), (e.rows, 1))
-    empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0), -1)
+    empty = LinearErrors(*(np.zeros(0),) * 4, (), np.zeros(0), np.zeros(0), -1,
+                         np.zeros(0, int))  # fmt: skip
     track = Track(
         experiment=e, scale=scale, noise=noise, motion=motion, motion_std=spread,
         windows=windows_of(e.rows, e.rows, motion, block), errors=empty, gain=np.zeros(0),

@@ -1,0 +1,64 @@
+"""Readings whose noise is coloured, where that is likelier than white noise.
+
+A sensor's filter, vibration or interference leaves errors that last for some rows. Taken for white,
+they pass for an unknown torque, and beside a large unknown torque no law stands out. The noise of
+each reading has a white part and an autoregression of first order (Ljung, System Identification,
+2nd ed. 1999, section 4.2); how long it lasts is decided before the search.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.criteria import COLOUR_GAIN, COLOUR_ROWS, COLOUR_SHARE
+from rsea_core.identify.multistep.estimator import Estimator
+from rsea_core.identify.multistep.noise_estimate import estimated_noise
+from rsea_core.identify.multistep.tracks import Track, prepared
+
+SMALLER = 0.1  # unknown inputs beside which coloured noise is looked for too
+
+
+def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say) -> Estimator:
+    """The estimator with the colour of the readings' noise that makes them likeliest."""
+    residuals = [r[0] for r in estimator.residuals([(h, x)])]
+    if not all(np.all(np.isfinite(r)) for r in residuals):
+        return estimator
+    best, least = estimator, _likelihood(estimator, h, x) + COLOUR_GAIN
+    for rows in COLOUR_ROWS:
+        time = rows * max(t.experiment.recording.sample_time_s for t in estimator.tracks)
+        if not all(_tells(t, time) for t in estimator.tracks):
+            continue
+        for share in (1.0, SMALLER):
+            own = estimator.having(
+                estimated_noise([_coloured(t, time, share) for t in estimator.tracks], residuals)
+            )
+            likelihood = _likelihood(own, h, x)
+            if likelihood > least:
+                best, least = own, likelihood
+    if best is not estimator:
+        gain = least - _likelihood(estimator, h, x)
+        time = best.tracks[0].noise.colour_time_s
+        say(f"noise of the readings lasts {time:.3g} s: {gain:.1f} units likelier")
+    return best
+
+
+def _tells(t: Track, time_s: float) -> bool:
+    """Whether averaged rows show such a colour, and the motion does not look like it."""
+    row = t.block * t.experiment.recording.sample_time_s
+    return row < time_s < COLOUR_SHARE * t.scale.time_s
+
+
+def _coloured(t: Track, time_s: float, share: float) -> Track:
+    noise = replace(
+        t.noise, inputs=share * t.noise.inputs, colours=t.noise.readings.copy(),
+        colour_time_s=time_s,
+    )  # fmt: skip
+    return prepared(t, noise=noise)
+
+
+def _likelihood(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
+    """Log-likelihood of all rows, not tempered."""
+    plain = Estimator(estimator.problem, estimator.tracks, cache=estimator.cache)
+    return -float(plain.costs([(h, x)])[0])
