@@ -19,6 +19,7 @@ from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown,
 EXPONENT, DEPTH, LOSS_FACTOR = slots(
     "contact_exponent", "contact_reference_depth", "contact_loss_factor"
 )
+BENCH_DEPTH_rad = 0.05  # at which the stiffness of the bench's contact holds
 DEEP_rad = 0.3  # depth of a nonlinear contact that the default step is made for
 
 
@@ -37,7 +38,7 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     if w.kind != "contact":
         return
     d.put(EXPONENT, v["exponent"])
-    d.put(DEPTH, v.get("reference_depth_rad", 0.05))
+    d.put(DEPTH, v.get("reference_depth_rad", BENCH_DEPTH_rad))
     d.put(LOSS_FACTOR, v.get("loss_factor_s_per_rad", 0.0))
 
 
@@ -126,10 +127,19 @@ class ContactNonlinear(Term):
         loss = Unknown(name="loss_factor_s_per_rad", unit="s/rad", low=0.0, high=5.0, scale=0.1,
                        prior=1.0)  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "environment", "write": _write, "kind": cls}
+        unknowns: tuple[Unknown, ...] = (power,)
+        starts: tuple[tuple[float, ...], ...] = ((1.2,), (1.5,))
+        if typical.relative:  # at which depth the stated stiffness holds, nobody says
+            depth = typical.like_angle(BENCH_DEPTH_rad)
+            unknowns += (
+                Unknown(name="reference_depth_rad", unit="rad", low=0.02 * depth, high=50 * depth,
+                        scale=0.2, log=True, prior=1.0),
+            )  # fmt: skip
+            starts = tuple((n, depth) for (n,) in (*starts, (2.0,)))
         return (
-            Law(law="power", unknowns=(power,), starts=((1.2,), (1.5,)),
-                richer=("hunt-crossley",), **common),
-            Law(law="hunt-crossley", unknowns=(power, loss), starts=((1.3, 0.2),), **common),
+            Law(law="power", unknowns=unknowns, starts=starts, richer=("hunt-crossley",), **common),
+            Law(law="hunt-crossley", unknowns=(*unknowns, loss), starts=((*starts[0], 0.2),),
+                **common),
         )  # fmt: skip
 
     @classmethod
