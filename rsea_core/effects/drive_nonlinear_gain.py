@@ -1,4 +1,4 @@
-"""A drive whose output is not in proportion to its command: gain by sign and by size."""
+"""A drive whose output is not in proportion to its command: gain by sign, size and square."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -12,33 +12,37 @@ from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
-BY_SIGN, BY_SIZE = slots("command_gain_by_sign", "command_gain_by_size")
+BY_SIGN, BY_SIZE, BY_SQUARE = slots(
+    "command_gain_by_sign", "command_gain_by_size", "command_gain_by_square"
+)
 
 
 @njit(error_model="numpy", inline="always")
 def with_nonlinear_gain(fx, command):
     """What a drive with such a gain makes of a command."""
-    return command + (fx[BY_SIGN] + fx[BY_SIZE] * command) * abs(command)
+    curved = (fx[BY_SIGN] + fx[BY_SIZE] * command) * abs(command)
+    return command + curved + fx[BY_SQUARE] * command * command * command
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveNonlinearGain(Term):
     """An amplifier that gives less in one direction, or more or less of large commands.
 
-    acting command = u + by_sign |u| + by_size u |u|. A diagnosis that finds it names no effect of
-    the contract: the verdict is `unexplained` with this formula.
+    acting command = u + by_sign |u| + by_size u |u| + by_square u^3. A motor whose iron saturates
+    is one under a commanded current: k_t falls with the current's square. A diagnosis that finds
+    it names no effect of the contract: the verdict is `unexplained` with this formula.
 
     Source
     ------
-    The even and the odd term of second order of a static input nonlinearity (Hammerstein model:
-    Ljung, System Identification, 1999, section 5.2).
+    The lowest terms of a static input nonlinearity (Hammerstein model: Ljung, System
+    Identification, 1999, section 5.2).
     """
 
     effect: ClassVar[str] = "drive-nonlinear-gain"
-    law: ClassVar[str] = "second-order"
+    law: ClassVar[str] = "third-order"
     port: ClassVar[Port] = Port.DRIVE
     headline: ClassVar[str] = "The drive's output is not in proportion to its command."
-    figure_units: ClassVar[Mapping[str, str]] = {"by_sign": "-", "by_size": "-"}
+    figure_units: ClassVar[Mapping[str, str]] = {"by_sign": "-", "by_size": "-", "by_square": "-"}
 
     by_sign: float = parameter(
         0.0, unit="-", bounds=(-1.0, 1.0), source="a fit",
@@ -49,16 +53,25 @@ class DriveNonlinearGain(Term):
         meaning="Change of the gain for each unit of the command's size (duty, V or A).",
     )  # fmt: skip
 
+    by_square: float = parameter(
+        0.0, unit="-", bounds=(-1e9, 1e9), source="a fit",
+        meaning="Change of the gain for each unit of the command's square.",
+    )  # fmt: skip
+
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Both changes of the gain, that by size at the full command."""
-        return {"by_sign": self.by_sign, "by_size": self.by_size * context.full_command}
+        """The changes of the gain, those by size and square at the full command."""
+        full = context.full_command
+        return {"by_sign": self.by_sign, "by_size": self.by_size * full,
+                "by_square": self.by_square * full**2}  # fmt: skip
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """Both changes of the gain."""
-        return {"command_gain_by_sign": self.by_sign, "command_gain_by_size": self.by_size}
+        """The changes of the gain."""
+        return {"command_gain_by_sign": self.by_sign, "command_gain_by_size": self.by_size,
+                "command_gain_by_square": self.by_square}  # fmt: skip
 
     def equation(self) -> str:
-        return f"acting command = u + {self.by_sign:.4g} |u| + {self.by_size:.4g} u |u|"
+        square = f" + {self.by_square:.4g} u^3" if self.by_square != 0.0 else ""
+        return f"acting command = u + {self.by_sign:.4g} |u| + {self.by_size:.4g} u |u|{square}"
 
     @classmethod
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
@@ -77,13 +90,15 @@ class DriveNonlinearGain(Term):
         sign = Unknown(name="by_sign", unit="-", low=-0.9, high=0.9, scale=0.005)
         size = Unknown(name="by_size", unit="-", low=-0.9 / span, high=0.9 / span,
                        scale=0.01 / span)  # fmt: skip
+        square = Unknown(name="by_square", unit="-", low=-0.9 / span**2, high=0.9 / span**2,
+                         scale=0.01 / span**2)  # fmt: skip
         return Law(
             effect=cls.effect, law=cls.law, subsystem="drive", kind=cls,
-            write=writes_numbers(cls), unknowns=(sign, size), starts=((0.0, 0.0),),
+            write=writes_numbers(cls), unknowns=(sign, size, square), starts=((0.0, 0.0, 0.0),),
         )  # fmt: skip
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
-        """Both changes."""
-        sign, size = f.figures["by_sign"], f.figures["by_size"]
+        """The changes."""
+        sign, size = f.figures["by_sign"], f.figures["by_size"] + f.figures.get("by_square", 0.0)
         return f"a drive whose gain changes by {sign:+.2%} with the sign, {size:+.2%} up to full"

@@ -9,7 +9,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
+from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.formula_torque import FORMULAS, FormulaTorque, formula_law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.formula.sparse_regression import Selection, select
@@ -19,6 +21,7 @@ from rsea_core.identify.law_search.hold_out import held_out
 from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.shape_search import Shape, ports
 from rsea_core.identify.multistep.criteria import (
+    FURTHER_GAIN,
     KEPT_RATIO,
     LEAST_GAIN,
     PER_VALUE,
@@ -29,6 +32,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.window_fit import fit_of, spread_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 
+OF_COMMAND = (DriveSaturation.effect, DriveDeadZone.effect)
 OF_SHAPE = 0.6  # of the free shape's held-out gain, that a formula must reach
 
 
@@ -92,7 +96,7 @@ class CommandFormula:
     Attributes
     ----------
     deviations : tuple of float
-        Of both coefficients.
+        Of the coefficients.
     """
 
     term: DriveNonlinearGain
@@ -105,10 +109,11 @@ class CommandFormula:
 
     def text(self) -> str:
         """The formula with its error bars."""
-        sign, size = self.deviations
+        sign, size, square = self.deviations
         return (
             f"acting command = u + ({self.term.by_sign:.3g} +- {sign:.1g}) |u|"
             f" + ({self.term.by_size:.3g} +- {size:.1g}) u |u|"
+            f" + ({self.term.by_square:.3g} +- {square:.1g}) u^3"
         )
 
     def sentence(self) -> str:
@@ -117,12 +122,13 @@ class CommandFormula:
 
     def report(self) -> dict:
         """The formula as data."""
-        sizes = zip(("by_sign", "by_size"), self.deviations, strict=True)
+        names = ("by_sign", "by_size", "by_square")
+        sizes = zip(names, self.deviations, strict=True)
         return {
             "words": self.text(),
             "terms": [
                 {"function": function, "coefficient": getattr(self.term, name), "std": std}
-                for function, (name, std) in zip(("|u|", "u |u|"), sizes, strict=True)
+                for function, (name, std) in zip(("|u|", "u |u|", "u^3"), sizes, strict=True)
             ],
         }
 
@@ -143,6 +149,18 @@ def unnamed_formula(
     return shape, formula_of(found, shape, say)
 
 
+def gain_over_named(found: Found, say: Callable[[str], None]) -> CommandFormula | None:
+    """A formula of the command that says clearly more than the drive's law that was named.
+
+    A limit or a dead zone is the nearest name of a gain that falls or grows with the command.
+    """
+    if len(found.steps) != 1 or found.steps[0].law.effect not in OF_COMMAND:
+        return None
+    formula = command_formula_of(found, say)
+    clearly = found.steps[0].gain + FURTHER_GAIN
+    return formula if formula is not None and formula.gain > clearly else None
+
+
 def command_formula_of(found: Found, say: Callable[[str], None]) -> CommandFormula | None:
     """The drive's gain as a function of its command; None where none is confirmed."""
     estimator, base = found.base_estimator, found.base
@@ -153,7 +171,7 @@ def command_formula_of(found: Found, say: Callable[[str], None]) -> CommandFormu
         return None
     law = DriveNonlinearGain.unnamed(span)
     h = Hypothesis(laws=(*base.hypothesis.laws, law))
-    x = np.concatenate([base.x, [0.0, 0.0]])
+    x = np.concatenate([base.x, np.zeros(len(law.unknowns))])
     own, fit = settled(estimator, estimator.fit(h, x, iterations=8))
     gain = gain_of(own, base, fit) - PER_VALUE * len(law.unknowns)
     if gain < SHAPE_GAIN or at_bound(own.problem, fit, law):
@@ -161,7 +179,7 @@ def command_formula_of(found: Found, say: Callable[[str], None]) -> CommandFormu
     ratio = confirmed(own, base, fit)
     say(f"  gain of the drive by its command: gain {gain:.1f}, ratio {ratio:.1f}")
     unit_steps = np.array([p.scale for p in law.unknowns])
-    std = spread_of(own, fit_of(own, fit)).std[-2:] * unit_steps
+    std = spread_of(own, fit_of(own, fit)).std[-len(unit_steps) :] * unit_steps
     values = own.problem.values(h, fit.x)[1][-1]
     sizes = np.array([values[p.name] for p in law.unknowns])
     if (

@@ -49,7 +49,7 @@ from rsea_core.identify.window_fit import (
     spread_of,
     strained_value,
 )
-from rsea_core.identify.window_formula import unnamed_formula
+from rsea_core.identify.window_formula import gain_over_named, unnamed_formula
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
@@ -64,6 +64,9 @@ class WindowVerdict(Conclusion):
 
     def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
         found, self.held_out = _beyond_chance(found)
+        instead = gain_over_named(found, say)
+        if instead is not None:
+            found, self.held_out = _without_laws(found), None
         self.found, self.problem = found, found.problem
         self.case = self.problem.case
         self.recorded = recorded
@@ -71,7 +74,10 @@ class WindowVerdict(Conclusion):
         self.search = FoundSearch(parameters=plain)
         self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
-        self.unknown, self.formula = unnamed_formula(found, self._unknown_shape(), say)
+        shape = self._unknown_shape()
+        self.unknown, self.formula = (
+            (None, instead) if instead is not None else unnamed_formula(found, shape, say)
+        )
         if self.formula is not None:
             self.fit = fit_of(self.formula.estimator, self.formula.fit)
             self.estimator = self.formula.estimator
@@ -349,9 +355,13 @@ def _beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
     unseen = held_out(found) if found.steps else None
     if unseen is None or unseen.gain >= WORSE or found.steps[0].gain > UNEVEN_GAIN:
         return found, unseen
-    plain = replace(found, steps=[], shapes=found.base_shapes, best=found.base,
-                    estimator=found.base_estimator)  # fmt: skip
-    return plain, None
+    return _without_laws(found), None
+
+
+def _without_laws(found: Found) -> Found:
+    """Parameters alone, with the shapes that they leave."""
+    return replace(found, steps=[], shapes=found.base_shapes, best=found.base,
+                   estimator=found.base_estimator)  # fmt: skip
 
 
 def _gains_much(step) -> bool:

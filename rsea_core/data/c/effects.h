@@ -8,7 +8,8 @@ static double rsea_acting(double command) {
         command -= E_rounded_dead_zone * tanh(command / E_rounded_dead_zone);
     if (fabs(command) <= E_dead_zone) command = 0.0;
     else command -= command > 0.0 ? E_dead_zone : -E_dead_zone;
-    return command + (E_command_gain_by_sign + E_command_gain_by_size * command) * fabs(command);
+    return command + (E_command_gain_by_sign + E_command_gain_by_size * command) * fabs(command)
+        + E_command_gain_by_square * command * command * command;
 }
 /* Factor on k_t and k_e, over the wheel's angle and the rises of temperature. */
 static double rsea_constant_factor(double wheel, double winding, double body) {

@@ -12,6 +12,7 @@ import numpy as np
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
+from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
@@ -68,6 +69,7 @@ from rsea_core.identify.multistep.criteria import (
     WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.experiment import Experiment
 from rsea_core.identify.multistep.horizons import (
     likelier,
     parameters_with_timing,
@@ -76,8 +78,10 @@ from rsea_core.identify.multistep.horizons import (
 )
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.tracks import prepared
+from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case
 
+ANGLES = ("motor_angle_rad", "load_angle_rad")
 HOLDS_NO_CLAIM = (DriveDelay.effect, SensorNoise.effect)  # nuisances, or no physics
 
 
@@ -154,9 +158,20 @@ def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
 
 
 def _observable(law: Law, estimator: Estimator) -> bool:
-    """Whether a law's fastest motion is one that rows can show."""
+    """Whether the readings can show a law of a sensor: two of them tell which one is late.
+
+    One angle alone shows no offset: it is an angle of gravity, or none at all.
+    """
     single = all(len(t.experiment.channels) == 1 for t in estimator.tracks)
-    return not (law.kind is SensorDelay and single)
+    angles = max(_angles(t.experiment) for t in estimator.tracks)
+    unseen = law.kind is SensorOffset and law.sensor in ANGLES and angles < 2
+    return not unseen and not (law.kind is SensorDelay and single)
+
+
+def _angles(e: Experiment) -> int:
+    """How many angles a recording has, the goal of a servo and a deflection among them."""
+    goal = e.recording.command_name == POSITION_COMMAND
+    return goal + sum(name.endswith("_rad") for name in e.channels)
 
 
 def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | None:

@@ -31,7 +31,7 @@ WALL = Load(kind="contact", contact_stiffness_Nm_per_rad=200.0, contact_angle_ra
 DRIVE = (
     r.DriveDeadZone(width_duty=0.03),
     r.DriveOffset(offset=0.01),
-    r.DriveNonlinearGain(by_sign=0.05, by_size=-0.1),
+    r.DriveNonlinearGain(by_sign=0.05, by_size=-0.1, by_square=0.2),
     r.DriveSaturation(source_resistance_ohm=1.0, returned_share=0.0, ripple_share=0.5),
     r.DriveThermal(
         winding_heat_capacity_J_per_K=0.5, winding_to_case_W_per_K=0.3,

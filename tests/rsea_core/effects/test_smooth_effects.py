@@ -218,10 +218,10 @@ def test_a_rounded_dead_zone_is_the_duty_less_its_width_times_tanh(width):
     np.testing.assert_allclose(found.load_angle_rad, plain.load_angle_rad, rtol=0.0, atol=1e-12)
 
 
-def test_a_nonlinear_gain_is_the_duty_with_its_second_order_terms():
+def test_a_nonlinear_gain_is_the_duty_with_its_terms_of_second_and_third_order():
     asked = 0.2 * np.sin(9.0 * TIME)
-    acting = asked + 0.05 * np.abs(asked) - 0.3 * asked * np.abs(asked)
-    term = DriveNonlinearGain(by_sign=0.05, by_size=-0.3)
+    acting = asked + 0.05 * np.abs(asked) - 0.3 * asked * np.abs(asked) + 0.7 * asked**3
+    term = DriveNonlinearGain(by_sign=0.05, by_size=-0.3, by_square=0.7)
     found, plain = (
         simulate(ActuatorModel(BENCH, terms), Inputs(time_s=TIME, duty=duty))
         for terms, duty in (((term,), asked), ((), acting))
