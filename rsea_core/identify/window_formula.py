@@ -134,12 +134,20 @@ class CommandFormula:
 
 
 def unnamed_formula(
-    found: Found, shape: Shape | None, say: Callable[[str], None]
-) -> tuple[Shape | None, Formula | CommandFormula | None]:
+    found: Found, shape: Shape | None, say: Callable[[str], None],
+    instead: CommandFormula | None = None,
+) -> tuple[Shape | None, Formula | CommandFormula | None]:  # fmt: skip
     """What has no name: its shape, and a formula of the command if that predicts, or of the motion.
 
     A formula of the command takes the place of the shape; beside laws there is none.
+
+    Parameters
+    ----------
+    instead : CommandFormula or None
+        The one that took the place of a law.
     """
+    if instead is not None:
+        return None, instead
     if found.steps:
         return shape, None
     if shape is None or shape.signal in ("command", "current"):

@@ -66,18 +66,14 @@ class WindowVerdict(Conclusion):
         found, self.held_out = _beyond_chance(found)
         instead = gain_over_named(found, say)
         if instead is not None:
-            found, self.held_out = _without_laws(found), None
+            found, self.held_out = found.parameters_alone(), None
         self.found, self.problem = found, found.problem
-        self.case = self.problem.case
-        self.recorded = recorded
+        self.case, self.recorded = self.problem.case, recorded
         plain = fit_of(found.base_estimator, found.base)
         self.search = FoundSearch(parameters=plain)
         self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
-        shape = self._unknown_shape()
-        self.unknown, self.formula = (
-            (None, instead) if instead is not None else unnamed_formula(found, shape, say)
-        )
+        self.unknown, self.formula = unnamed_formula(found, self._unknown_shape(), say, instead)
         if self.formula is not None:
             self.fit = fit_of(self.formula.estimator, self.formula.fit)
             self.estimator = self.formula.estimator
@@ -355,13 +351,7 @@ def _beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
     unseen = held_out(found) if found.steps else None
     if unseen is None or unseen.gain >= WORSE or found.steps[0].gain > UNEVEN_GAIN:
         return found, unseen
-    return _without_laws(found), None
-
-
-def _without_laws(found: Found) -> Found:
-    """Parameters alone, with the shapes that they leave."""
-    return replace(found, steps=[], shapes=found.base_shapes, best=found.base,
-                   estimator=found.base_estimator)  # fmt: skip
+    return found.parameters_alone(), None
 
 
 def _gains_much(step) -> bool:

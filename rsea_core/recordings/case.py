@@ -26,6 +26,7 @@ from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import COLUMNS, RESPONSES, ROLES, Recording, read_recording
 
 FARTHEST_s, CLOSEST_s = 0.4, 5e-6  # rows of a motion
+DEFLECTION = "spring_deflection_rad"
 COARSER = 10.0  # times the noise of most rows: from there on steps are what a reading resolves
 CLOCKS = (("milliseconds", 1e-3), ("microseconds", 1e-6), ("nanoseconds", 1e-9))
 LOAD_KEYS = tuple(f.name for f in fields(Load))[1:]
@@ -42,15 +43,8 @@ RECORDING_KEYS = (
     "end_s",
     *LOAD_KEYS,
 )
-TEST_KEYS = (
-    "file",
-    "load",
-    "description",
-    "initial_motor_angle_rad",
-    "initial_load_angle_rad",
-    "initial_temperature_C",
-    *LOAD_KEYS,
-)
+TEST_KEYS = ("file", "load", "description", "initial_motor_angle_rad", "initial_load_angle_rad",
+             "initial_temperature_C", *LOAD_KEYS)  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -260,9 +254,7 @@ def _require_columns(rig: Rig, recording: Recording, path: Path) -> None:
     if not recording.responses:
         raise RecordingError(f"{path}: needs a response column ({', '.join(RESPONSES)})")
     kind = recording.load.kind
-    if kind == "imposed" and not {"load_angle_rad", "spring_deflection_rad"} & set(
-        recording.columns
-    ):
+    if kind == "imposed" and not {"load_angle_rad", DEFLECTION} & set(recording.columns):
         raise RecordingError(
             f'{path}: load "imposed" needs the column load_angle_rad or spring_deflection_rad'
         )
@@ -299,9 +291,8 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
     require_known(table, TEST_KEYS, where, RecordingError)
     name = _word(table, "file", where)
     load = _load(table, where)
-    optional = (*COMMANDS, "current_A", "load_angle_rad", "supply_V", "drive_enabled")
-    if rig.parts == ("spring",):
-        optional = ("load_angle_rad", "spring_deflection_rad")
+    every = (*COMMANDS, "current_A", "load_angle_rad", "supply_V", "drive_enabled")
+    optional = every if rig.parts != ("spring",) else ("load_angle_rad", DEFLECTION)
     columns = read_columns(folder / name, RecordingError, required=("time_s",), optional=optional)
     given = [column for column in (*COMMANDS, "current_A") if column in columns]
     if rig.has("drive") and not given:
@@ -311,8 +302,8 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
     if given:
         values["current_command_A" if given[0] == "current_A" else given[0]] = columns[given[0]]
     if load.kind == "imposed":
-        if "spring_deflection_rad" in columns and "load_angle_rad" not in columns:
-            columns["load_angle_rad"] = -columns["spring_deflection_rad"]  # its hub is held
+        if DEFLECTION in columns:  # of a spring alone: its hub is held
+            columns.setdefault("load_angle_rad", -columns[DEFLECTION])
         if "load_angle_rad" not in columns:
             raise RecordingError(f'{folder / name}: load "imposed" needs load_angle_rad')
         values["load_angle_rad"] = columns["load_angle_rad"]

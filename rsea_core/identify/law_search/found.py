@@ -1,6 +1,6 @@
 """What the search for laws found: parameters alone, the laws taken, and their rivals."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -91,6 +91,11 @@ class Found:
             estimator=self.base_estimator, best=self.base, horizon=self.base_horizon,
             base_horizon=self.base_horizon,
         )  # fmt: skip
+
+    def parameters_alone(self) -> "Found":
+        """The same without the laws, which something else refutes: parameters and their shapes."""
+        return replace(self, steps=[], shapes=self.base_shapes, best=self.base,
+                       estimator=self.base_estimator)  # fmt: skip
 
     def continue_from(self, estimator: Estimator, fit: Estimate) -> None:
         """Take a fit of the same laws that arrived further."""

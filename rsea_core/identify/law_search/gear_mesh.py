@@ -30,7 +30,7 @@ def encoders_disagree(found: Found) -> bool:
         e = t.experiment
         if e.read_twice and "torque_Nm" not in e.channels:
             at = [e.channels.index(name) for name in BOTH]
-            if np.any(t.noise.readings[at] > DISAGREE * e.floor_of_each[at]):
+            if np.any(t.noise.of_readings[at] > DISAGREE * e.floor_of_each[at]):
                 return True
     return False
 

@@ -50,6 +50,11 @@ class Noise:
     colour_time_s: float = 0.0
 
     @property
+    def of_readings(self) -> NDArray:
+        """(p,) deviations of the readings, coloured part included."""
+        return np.hypot(self.readings, self.colours) if self.colours.size else self.readings
+
+    @property
     def sizes(self) -> NDArray:
         """(5 or 5 + p,) deviations of all that drives the errors."""
         return np.concatenate([self.inputs, self.colours])
@@ -120,21 +125,18 @@ def linear_errors(
     d = n + (slow >= 0) + len(later)
     colours = d + np.arange(noise.colours.size)
     d += colours.size
-    slope = np.cos(load_angle + plant.gravity_offset)
-    mode = np.clip(
-        np.round((slope + 1.0) * 0.5 * (GRAVITY_LEVELS - 1)), 0, GRAVITY_LEVELS - 1
-    ).astype(np.int64)
-    contact = load_angle > plant.contact_angle
-    mode = mode + GRAVITY_LEVELS * contact
+    mode = _modes(plant, load_angle)
     A = np.zeros((2 * GRAVITY_LEVELS, d, d))
     unit = np.zeros((5 + colours.size, 2 * GRAVITY_LEVELS, d, d))
     densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
     densities += [np.zeros((d, d)), _command(plant, states, row_s, d)]
-    if slow >= 0:  # of the size in the long run
-        densities[3][slow, slow] = 2.0 / (SLOW * time_s)
+    own = np.zeros((d, d))  # of what has a time of its own
+    if slow >= 0:
+        own[states.index(k.WW), slow] = 1.0 / _wheel(plant)
+        densities[3][slow, slow] = _markov(own, slow, SLOW * time_s)
     for at in colours:
         densities.append(np.zeros((d, d)))
-        densities[-1][at, at] = 2.0 / noise.colour_time_s
+        densities[-1][at, at] = _markov(own, at, noise.colour_time_s)
     for j in np.unique(mode):
         level = -1.0 + 2.0 * (j % GRAVITY_LEVELS) / (GRAVITY_LEVELS - 1)
         full = linear_plant(
@@ -143,13 +145,8 @@ def linear_errors(
         ).A  # fmt: skip
         if plant.structure == mp.RIGID_FREE:
             full = one_body(full)
-        M = np.zeros((d, d))
+        M = own.copy()
         M[:n, :n] = full[np.ix_(states, states)]
-        if slow >= 0:
-            M[states.index(k.WW), slow] = 1.0 / _wheel(plant)
-            M[slow, slow] = -1.0 / (SLOW * time_s)
-        for at in colours:
-            M[at, at] = -1.0 / noise.colour_time_s
         for m, density in enumerate(densities):
             A[j], unit[m, j] = discretised(M, density, row_s)
     A, unit, mode = _with_levels(A, unit, mode, command_change)
@@ -159,6 +156,21 @@ def linear_errors(
     C[np.arange(colours.size), colours] = 1.0
     Q = np.tensordot(noise.sizes**2, unit, axes=1)
     return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow, colours)
+
+
+def _modes(plant: mp.Plant, load_angle: NDArray) -> NDArray:
+    """(n,) level of gravity's stiffness in each row, and whether it is in contact."""
+    slope = np.cos(load_angle + plant.gravity_offset)
+    level = np.clip(
+        np.round((slope + 1.0) * 0.5 * (GRAVITY_LEVELS - 1)), 0, GRAVITY_LEVELS - 1
+    ).astype(np.int64)
+    return level + GRAVITY_LEVELS * (load_angle > plant.contact_angle)
+
+
+def _markov(M: NDArray, at: int, time_s: float) -> float:
+    """Let a state forget itself in a time; its density for a deviation of one in the long run."""
+    M[at, at] = -1.0 / time_s
+    return 2.0 / time_s
 
 
 def _with_levels(A: NDArray, unit: NDArray, mode: NDArray, change: NDArray):
