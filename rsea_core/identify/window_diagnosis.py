@@ -7,6 +7,7 @@ import numpy as np
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.identify.clamped_loads import with_yielding_clamps
+from rsea_core.identify.law_search.gear_mesh import MESH_DAMPER
 from rsea_core.identify.law_search.investigate import investigate
 from rsea_core.identify.multistep.command_timing import RowTimes
 from rsea_core.identify.multistep.criteria import SURE
@@ -213,7 +214,17 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
     if timing.linear:
         text = "the command moves linearly from row to row of these logs; it is simulated so"
         found.append(Finding(kind=Kind.METHOD, text=text))
+    meshes = any(law.effect == MESH_DAMPER for law in conclusion.fit.hypothesis.laws)
+    if meshes:
+        stiffness = conclusion.nominal["spring_stiffness_Nm_per_rad"]
+        text = (
+            "motor and load angle disagree, and the rig file has no spring between them: the gear's"
+            f" mesh is modelled as a spring ({stiffness:.3g} Nm/rad) with a damper"
+        )
+        found.append(Finding(kind=Kind.METHOD, text=text))
     for j, p in enumerate(conclusion.problem.nominals):
+        if meshes and p.key == "spring_stiffness_Nm_per_rad":
+            continue  # no value of the file
         moved = abs(conclusion.fit.x[j])
         if moved > SURE and moved > 2.0 * std[j]:
             text = (
