@@ -51,10 +51,8 @@ def _tells(t: Track, time_s: float) -> bool:
 
 
 def _coloured(t: Track, time_s: float, share: float) -> Track:
-    noise = replace(
-        t.noise, inputs=share * t.noise.inputs, colours=t.noise.readings.copy(),
-        colour_time_s=time_s,
-    )  # fmt: skip
+    inputs = share * t.noise.inputs
+    noise = replace(t.noise, inputs=inputs, colours=t.noise.readings.copy(), colour_time_s=time_s)
     return prepared(t, noise=noise)
 
 

@@ -84,7 +84,12 @@ ARRIVED, OWED = 4.0, 0.3  # units, share of a law's worth: a fit that gains this
 ARRIVALS = 3  # times that it takes the place of the one before, which had not arrived
 CONTENDS = 1.5  # times the gain, each in its own share: a law from which another search begins
 COLOUR_ROWS = (3.0, 10.0, 30.0)  # that the coloured part of a reading's noise lasts
-COLOUR_GAIN = 20.0  # units of log-likelihood, not tempered, by which it must be likelier than white
+COLOUR_GAIN = (
+    100.0  # units of log-likelihood, not tempered, by which it must be likelier than white
+)
+MOST_COLOUR = (
+    3.0  # times the white part of a reading's noise: larger lasting errors are the model's
+)
 COLOUR_SHARE = 0.3  # of the time scale of the motion, that it lasts at most
 DISAGREE = 3.0  # floors of a reading: what a rigid train's encoders are apart by, beyond noise
 MESH_ROWS, MESH_TOLERANCE = 4.0, 0.5  # of a gear's mesh: rows of its cycle; share of its stiffness

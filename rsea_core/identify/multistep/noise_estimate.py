@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import machine_of
+from rsea_core.identify.multistep.criteria import MOST_COLOUR
 from rsea_core.identify.multistep.error_filter import Noise, with_density
 from rsea_core.identify.multistep.kalman_filter import (
     Filter,
@@ -125,7 +126,8 @@ def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
     j = track.experiment.channels.index(at)
     if kind == "colour":
         colours = noise.colours.copy()
-        colours[j] *= factor
+        most = MOST_COLOUR * noise.readings[j] * track.block**0.5
+        colours[j] = min(colours[j] * factor, most)
         return replace(noise, colours=colours)
     readings = noise.readings.copy()
     least = 0.5 * track.experiment.floor_of_each[j] / track.block**0.5
