@@ -16,11 +16,11 @@ from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 from rsea_core.effects.variant import Law, Unknown, writes_numbers
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import DISAGREE, MESH_ROWS, MESH_TOLERANCE
+from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 
 BOTH = ("motor_angle_rad", "load_angle_rad")
-MESH_DAMPER = "gear-mesh-damping"  # a nuisance, no effect
 DAMPING_RATIO = 0.2  # of the mesh, before a fit
 
 

@@ -38,7 +38,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     with_richer_rivals,
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
-from rsea_core.identify.law_search.gear_mesh import MESH_DAMPER, first_laws
+from rsea_core.identify.law_search.gear_mesh import first_laws
 from rsea_core.identify.law_search.longer_windows import lengthened
 from rsea_core.identify.law_search.pruning import pruned, without_weak_end
 from rsea_core.identify.law_search.pulses import pulse_ratio
@@ -76,7 +76,7 @@ from rsea_core.identify.multistep.horizons import (
     smooth,
     with_fine_steps,
 )
-from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER, nuisances
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import COLOUR_GAIN, COLOUR_ROWS, COLOUR_SHARE
 from rsea_core.identify.multistep.estimator import Estimator
+from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.multistep.noise_estimate import estimated_noise
 from rsea_core.identify.multistep.tracks import Track, prepared
 
@@ -21,7 +22,12 @@ SMALLER = 0.1  # unknown inputs beside which coloured noise is looked for too
 
 
 def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say) -> Estimator:
-    """The estimator with the colour of the readings' noise that makes them likeliest."""
+    """The estimator with the colour of the readings' noise that makes them likeliest.
+
+    None is looked for where a gear's mesh stands for a spring: the backlash that is missing lasts.
+    """
+    if any(law.effect == MESH_DAMPER for law in h.laws):
+        return estimator
     residuals = [r[0] for r in estimator.residuals([(h, x)])]
     if not all(np.all(np.isfinite(r)) for r in residuals):
         return estimator

@@ -32,6 +32,7 @@ CLOCK, FILTER, RATIO = (
     "sensor-filter",
     "gear-ratio-rounding",
 )  # nuisances, no effects
+MESH_DAMPER = "gear-mesh-damping"  # of a gear's mesh that stands for a spring: no effect either
 LEAST_DIGIT = 1e-6  # of a gear ratio: no angle shows less
 CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 
