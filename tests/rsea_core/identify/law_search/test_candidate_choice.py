@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
+from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_choice import promising, standing_out
@@ -19,6 +21,7 @@ from rsea_core.identify.law_search.candidate_fits import (
 )
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.screening import Candidate
+from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.identify.multistep.log_nuisances import nuisances
@@ -123,3 +126,14 @@ def test_a_fit_that_was_stopped_is_continued_and_one_that_arrived_is_not(dry_fri
     arrived = settled(found.estimator, found.best, once=True)
     again = continued_parent(arrived[1], (c, own, fit))
     assert again is None or gain_of(again[0], arrived[1], again[1]) < 4.0
+
+
+def test_one_angle_alone_shows_no_offset_and_no_reading_that_is_late(dry_friction):
+    """It would be an angle of gravity; which of two sensors is late needs both."""
+    found, _ = dry_friction
+    tracks = found.base_estimator.tracks
+    assert all(t.experiment.channels == ("motor_angle_rad",) for t in tracks)
+    effects = {law.effect for law in laws_of(found)}
+    assert SensorOffset.effect not in effects
+    assert SensorDelay.effect not in effects
+    assert LoadFriction.effect in effects or GearFriction.effect in effects

@@ -75,6 +75,15 @@ def test_a_drive_that_gives_less_in_one_direction_is_a_formula_of_the_drive(tmp_
     assert "drive-nonlinear-gain" in {law.effect for law, _ in found.model.laws}
 
 
+def test_a_torque_constant_that_falls_with_the_current_is_a_formula_and_no_current_limit(tmp_path):
+    """A current limit is the nearest name; the gain by the command's square says more."""
+    found = diagnose_windows(axis(tmp_path, DriveNonlinearGain(by_square=-0.02)), quick=True)
+    assert found.document["verdict"] == "unexplained"
+    assert found.document["location"]["subsystem"] == "drive"
+    assert not claims(found)
+    assert [t["function"] for t in found.document["remainder"]["formula"]["terms"]][-1] == "u^3"
+
+
 def test_what_the_data_cannot_decide_gets_an_experiment_that_would(tmp_path):
     found = diagnose_windows(axis(tmp_path, GearFriction(coulomb_Nm=6e-5)), quick=True).conclusion
     found.verdict = "insufficient-data"  # at this size it is, or nearly so
