@@ -305,7 +305,8 @@ def _test(folder: Path, rig: Rig, table: Mapping, where: str) -> InputRecording:
         if DEFLECTION in columns:  # of a spring alone: its hub is held
             columns.setdefault("load_angle_rad", -columns[DEFLECTION])
         if "load_angle_rad" not in columns:
-            raise RecordingError(f'{folder / name}: load "imposed" needs load_angle_rad')
+            wanted = "load_angle_rad" if every is optional else f"load_angle_rad or {DEFLECTION}"
+            raise RecordingError(f'{folder / name}: load "imposed" needs {wanted}')
         values["load_angle_rad"] = columns["load_angle_rad"]
     start = {
         key: number(table.get(key, 0.0), f"{where}: {key}", RecordingError)
