@@ -129,7 +129,7 @@ class ContactNonlinear(Term):
         common = {"effect": cls.effect, "subsystem": "environment", "write": _write, "kind": cls}
         unknowns: tuple[Unknown, ...] = (power,)
         starts: tuple[tuple[float, ...], ...] = ((1.2,), (1.5,))
-        if typical.relative:  # at which depth the stated stiffness holds, nobody says
+        if typical.relative:  # the file does not state at which depth its stiffness holds
             depth = typical.like_angle(BENCH_DEPTH_rad)
             unknowns += (
                 Unknown(name="reference_depth_rad", unit="rad", low=0.02 * depth, high=50 * depth,

@@ -28,9 +28,9 @@ def with_nonlinear_gain(fx, command):
 class DriveNonlinearGain(Term):
     """An amplifier that gives less in one direction, or more or less of large commands.
 
-    acting command = u + by_sign |u| + by_size u |u| + by_square u^3. A motor whose iron saturates
-    is one under a commanded current: k_t falls with the current's square. A diagnosis that finds
-    it names no effect of the contract: the verdict is `unexplained` with this formula.
+    acting command = u + by_sign |u| + by_size u |u| + by_square u^3. A motor with magnetic
+    saturation is one under a commanded current: k_t falls with the current's square. A diagnosis
+    that finds it names no effect of the contract: the verdict is `unexplained` with this formula.
 
     Source
     ------
@@ -52,7 +52,6 @@ class DriveNonlinearGain(Term):
         0.0, unit="-", bounds=(-1e9, 1e9), source="a fit",
         meaning="Change of the gain for each unit of the command's size (duty, V or A).",
     )  # fmt: skip
-
     by_square: float = parameter(
         0.0, unit="-", bounds=(-1e9, 1e9), source="a fit",
         meaning="Change of the gain for each unit of the command's square.",

@@ -1,9 +1,9 @@
 """A gear train without a spring whose two encoders disagree, with the gear's mesh as a spring.
 
-Without a spring motor and load are one rigid body, and backlash between them moves no prediction.
-Where neither the rig's values nor any law brings the two angles together, the mesh is taken for
-what it is: teeth that yield, with a damper beside them, and room for backlash before them.
-Stiffness and damping of the teeth are no claims. A stiff penalty contact with a damper stands for
+Without a spring motor and load are one rigid body, and backlash between them changes no
+prediction. Where neither the rig's values nor any law brings the two angles into agreement, the
+mesh becomes a spring with a damper in parallel, in which backlash acts. Its stiffness and its
+damping are no claims. A stiff penalty contact with a damper stands for
 the mesh in the gear models of Nordin & Gutman, Automatica 38 (2002) 1633, section 2.
 """
 

@@ -52,7 +52,7 @@ def _through_gear_mesh(case: Case, found: Found, say) -> Found:
     elastic = with_gear_mesh(case)
     if elastic is None:
         return found
-    say("searched again: the encoders of a rigid train disagree; its gear's mesh yields now")
+    say("searched again: the encoders of a rigid train disagree; now with an elastic gear mesh")
     other = searched(elastic[0], found.problem.timing, say, mesh=elastic[1])
     return other if other.steps else found
 

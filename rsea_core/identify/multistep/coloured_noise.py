@@ -3,7 +3,7 @@
 A sensor's filter, vibration or interference leaves errors that last for some rows. Taken for white,
 they pass for an unknown torque, and beside a large unknown torque no law stands out. The noise of
 each reading has a white part and an autoregression of first order (Ljung, System Identification,
-2nd ed. 1999, section 4.2); how long it lasts is decided before the search.
+2nd ed. 1999, section 4.2); its time constant is chosen before the search.
 """
 
 from dataclasses import replace
@@ -24,7 +24,8 @@ SMALLER = 0.1  # unknown inputs beside which coloured noise is looked for too
 def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say) -> Estimator:
     """The estimator with the colour of the readings' noise that makes them likeliest.
 
-    None is looked for where a gear's mesh stands for a spring: the backlash that is missing lasts.
+    None is looked for where a gear's mesh stands for a spring: errors of the missing backlash are
+    coloured too.
     """
     if any(law.effect == MESH_DAMPER for law in h.laws):
         return estimator
@@ -46,12 +47,12 @@ def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say)
     if best is not estimator:
         gain = least - _likelihood(estimator, h, x)
         time = best.tracks[0].noise.colour_time_s
-        say(f"noise of the readings lasts {time:.3g} s: {gain:.1f} units likelier")
+        say(f"coloured readings, time constant {time:.3g} s: {gain:.1f} units likelier")
     return best
 
 
 def _tells(t: Track, time_s: float) -> bool:
-    """Whether averaged rows show such a colour, and the motion does not look like it."""
+    """Whether averaged rows resolve this time constant, and it is short against the motion's."""
     row = t.block * t.experiment.recording.sample_time_s
     return row < time_s < COLOUR_SHARE * t.scale.time_s
 

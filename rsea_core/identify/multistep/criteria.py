@@ -16,7 +16,7 @@ EVEN = 0.1  # of the mean: least scatter of the stretches in that ratio
 MOST_OF_ONE = 20.0  # units of gain that one stretch counts in that ratio
 KEPT_RATIO = 3.5  # the same at the end, when laws that others explain are gone
 PULSE_GAIN = 15.0  # of a torque that acts once, before it is fitted
-PULSE_CHOICE = 10.0  # units: the logarithm of the intervals among which one was the best
+PULSE_CHOICE = 10.0  # units: logarithm of the number of intervals that were compared
 PULSES = 2  # tried, of all recordings
 WIDER, WIDER_TIMES = 6.0, 2  # factor of a size's bounds, and how often, where a fit ends at them
 FORMS = 2  # other forms of an effect that are tried where one ends at a bound
@@ -84,14 +84,10 @@ ARRIVED, OWED = 4.0, 0.3  # units, share of a law's worth: a fit that gains this
 ARRIVALS = 3  # times that it takes the place of the one before, which had not arrived
 CONTENDS = 1.5  # times the gain, each in its own share: a law from which another search begins
 COLOUR_ROWS = (3.0, 10.0, 30.0)  # that the coloured part of a reading's noise lasts
-COLOUR_GAIN = (
-    100.0  # units of log-likelihood, not tempered, by which it must be likelier than white
-)
-MOST_COLOUR = (
-    3.0  # times the white part of a reading's noise: larger lasting errors are the model's
-)
+COLOUR_GAIN = 100.0  # units, not tempered, by which coloured noise must be likelier than white
+MOST_COLOUR = 3.0  # times the white part of a reading's noise: larger errors are the model's
 COLOUR_SHARE = 0.3  # of the time scale of the motion, that it lasts at most
-DISAGREE = 3.0  # floors of a reading: what a rigid train's encoders are apart by, beyond noise
+DISAGREE = 3.0  # floors of a reading, by which the encoders of a rigid train differ
 MESH_ROWS, MESH_TOLERANCE = 4.0, 0.5  # of a gear's mesh: rows of its cycle; share of its stiffness
 LATE_ROWS = 0.5  # a command's delay from which each reading is tried with it instead
 MOVES = 1.0  # sum of squares of what a law changes in the innovations, below which it is absent

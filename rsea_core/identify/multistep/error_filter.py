@@ -130,7 +130,7 @@ def linear_errors(
     unit = np.zeros((5 + colours.size, 2 * GRAVITY_LEVELS, d, d))
     densities = [_inputs(plant, states, size, time_s, d) for size in np.eye(3)]
     densities += [np.zeros((d, d)), _command(plant, states, row_s, d)]
-    own = np.zeros((d, d))  # of what has a time of its own
+    own = np.zeros((d, d))  # of the Gauss-Markov states
     if slow >= 0:
         own[states.index(k.WW), slow] = 1.0 / _wheel(plant)
         densities[3][slow, slow] = _markov(own, slow, SLOW * time_s)
@@ -168,7 +168,7 @@ def _modes(plant: mp.Plant, load_angle: NDArray) -> NDArray:
 
 
 def _markov(M: NDArray, at: int, time_s: float) -> float:
-    """Let a state forget itself in a time; its density for a deviation of one in the long run."""
+    """Make a state a first-order Gauss-Markov process; its density for a variance of one."""
     M[at, at] = -1.0 / time_s
     return 2.0 / time_s
 
