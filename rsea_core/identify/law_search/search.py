@@ -65,6 +65,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSE_CHOICE,
     PULSE_RATIO,
+    SEARCH_STEP,
     SECOND_STARTS,
     WEAK,
 )
@@ -100,7 +101,7 @@ def searched(
     estimator, base, horizon = parameters_with_timing(
         case, h, say, timing=timing, quick=quick or bool(mesh)
     )
-    estimator, base = with_fine_steps(estimator, base, case, say)
+    estimator, base = with_fine_steps(estimator, base, say, longest=SEARCH_STEP)
     if not quick:
         estimator, base = settled(estimator, base)
     problem = estimator.problem

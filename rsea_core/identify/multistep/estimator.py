@@ -3,6 +3,7 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,8 @@ LONGEST_STEP = 3.0
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
 ENOUGH = 1e-3  # relative fall of the cost below which a fit has arrived
+FORESEEN = 0.5  # share of the foreseen fall, below which a corrected Jacobian is taken anew
+CORRECTIONS = 4  # of one Jacobian
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,44 +177,94 @@ class Estimator:
         return level, columns
 
     def fit(self, h: Hypothesis, x: NDArray, *, iterations: int = 8) -> Estimate:
-        """Levenberg-Marquardt from x."""
-        problem = self.problem
-        low, high = problem.bounds(h)
-        centre, weight = problem.prior(h)
+        """Levenberg-Marquardt from x.
+
+        Simulations for a Jacobian are most of the work. As long as steps lower the cost as
+        foreseen, the Jacobian is corrected by what they change (Broyden, Math. Comp. 19 (1965)
+        577) and not taken anew; only a fit that gains nothing by a new one has arrived.
+
+        Parameters
+        ----------
+        iterations : int
+            New Jacobians, at most.
+        """
+        low, high = self.problem.bounds(h)
         x = np.clip(x, low, high)
         cost = self.costs([(h, x)])[0]
-        damping, arrived = 1e-3, False
-        for _ in range(iterations):
+        damping, arrived, taken = 1e-3, False, 0
+        while taken < iterations and np.isfinite(cost) and not arrived:
             level, columns = self.jacobian(h, x)
-            if not np.isfinite(cost):
-                break
-            A, g = np.diag(weight**2), weight**2 * (x - centre)
-            for e, J in zip(level, columns, strict=True):
-                w = self.tempering * huber_weights(e).ravel()
-                flat = J.reshape(len(J), -1)
-                A = A + (flat * w) @ flat.T
-                g = g + (flat * w) @ e.ravel()
-            better = False
-            for _attempt in range(3):
-                factors = (damping, damping * 30.0, damping * 1000.0)
-                trials = [(h, _step(x, A, g, f, low, high)) for f in factors]
-                costs = self.costs(trials)
-                best = int(np.argmin(costs))
-                if costs[best] < cost:
-                    fall = cost - costs[best]
-                    x, cost, better = trials[best][1], costs[best], True
-                    damping = max(damping * (0.1, 3.0, 100.0)[best], 1e-8)
-                    arrived = fall < max(ENOUGH * abs(cost) * 1e-2, 0.05)
+            taken, corrected = taken + 1, 0
+            while True:
+                fresh = corrected == 0
+                A, g = self._normal(h, x, level, columns)
+                step, damping = self._best_step(h, x, cost, A, g, damping, fresh)
+                if step is None:
+                    arrived = fresh
                     break
-                damping *= 1e4
-            arrived = arrived or not better
-            if arrived:
-                break
+                moved, fall = step.x - x, cost - step.cost
+                little = fall < max(ENOUGH * abs(cost) * 1e-2, 0.05)
+                arrived = fresh and little
+                if arrived:  # x stays where its Jacobian is known: the next fit begins there
+                    break
+                foreseen = -float(g @ moved + 0.5 * moved @ A @ moved)
+                x, cost = step.x, step.cost
+                if little or fall < FORESEEN * foreseen or corrected == CORRECTIONS:
+                    break
+                columns = [
+                    J + _correction(J, moved, after - e)
+                    for J, e, after in zip(columns, level, step.innovations, strict=True)
+                ]
+                level, corrected = step.innovations, corrected + 1
+        centre, weight = self.problem.prior(h)
         prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(
             hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,
             likelihood=float(cost - prior_cost) / self.tempering,
         )  # fmt: skip
+
+    def _normal(self, h: Hypothesis, x: NDArray, level, columns) -> tuple[NDArray, NDArray]:
+        """Gauss-Newton matrix (n, n) and gradient (n,) of the cost."""
+        centre, weight = self.problem.prior(h)
+        A, g = np.diag(weight**2), weight**2 * (x - centre)
+        for e, J in zip(level, columns, strict=True):
+            w = self.tempering * huber_weights(e).ravel()
+            flat = J.reshape(len(J), -1)
+            A = A + (flat * w) @ flat.T
+            g = g + (flat * w) @ e.ravel()
+        return A, g
+
+    def _best_step(
+        self, h: Hypothesis, x: NDArray, cost: float, A: NDArray, g: NDArray, damping: float,
+        fresh: bool,
+    ) -> tuple["_Step | None", float]:  # fmt: skip
+        """The best of some damped steps that lowers the cost, and the damping for the next one."""
+        low, high = self.problem.bounds(h)
+        for _attempt in range(3 if fresh else 1):
+            factors = (damping, damping * 30.0, damping * 1000.0)[: 3 if fresh else 2]
+            trials = [(h, _step(x, A, g, f, low, high)) for f in factors]
+            found = self.innovations(trials)
+            costs = self.costs(trials, found)
+            best = int(np.argmin(costs))
+            if costs[best] < cost:
+                step = _Step(trials[best][1], float(costs[best]), [e[best] for e in found])
+                return step, max(damping * (0.1, 3.0, 100.0)[best], 1e-8)
+            damping = damping * 1e4 if fresh else damping
+        return None, damping
+
+
+class _Step(NamedTuple):
+    """Unknowns (n,) that lower the cost, that cost, and the innovations (n, p) there."""
+
+    x: NDArray
+    cost: float
+    innovations: list[NDArray]
+
+
+def _correction(J: NDArray, moved: NDArray, change: NDArray) -> NDArray:
+    """What makes derivatives (u, n, p) agree with how a step (u,) changed innovations (n, p)."""
+    rest = change - np.tensordot(moved, J, axes=1)
+    return moved[:, None, None] * (rest / float(moved @ moved))
 
 
 def _step(x, A, g, damping, low, high) -> NDArray:

@@ -34,6 +34,7 @@ from rsea_core.identify.multistep.command_timing import (
     even_times,
     runs_at,
 )
+from rsea_core.identify.multistep.criteria import FIRST_STEP
 from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
@@ -140,14 +141,14 @@ class Experiment:
 
 def experiment(
     model: ActuatorModel, r: Recording, where: RunConditions, *,
-    timing: CommandTiming = AS_LOGGED, step_share: float = 1.0,
+    timing: CommandTiming = AS_LOGGED, step_share: float = FIRST_STEP,
 ) -> Experiment:  # fmt: skip
     """A recording under a command that is held from row to row, or moves linearly.
 
     Parameters
     ----------
     step_share : float
-        Of the engine's first step (`STEPS_PER_CYCLE`).
+        Longest step of the engine, of a cycle's `STEPS_PER_CYCLE`-th part.
     """
     finer = FINER if timing.linear and r.load.kind != "imposed" and r.command_name else 1
     inputs = r.inputs()
@@ -170,8 +171,9 @@ def experiment(
     replay = Replay.of(inputs, **more)
     numbers = replay.numbers(model)
     step = _step_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
-    step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
-    replay = Replay.of(inputs, step_s=step_share * step, **more)
+    stable = longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE
+    step = min(step_share * step, min(step_share, 1.0) * stable)
+    replay = Replay.of(inputs, step_s=step, **more)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
     channels += tuple(v for a, v in VELOCITIES.items() if v in r.responses and a not in r)
     require_comparable(r, channels)
@@ -245,7 +247,9 @@ class MultistepProblem(Problem):
 
     reach = STATED_BOUND  # tolerances that a value which the rig file states may move
 
-    def __init__(self, case: Case, *, timing: CommandTiming = AS_LOGGED, step_share: float = 1.0):
+    def __init__(
+        self, case: Case, *, timing: CommandTiming = AS_LOGGED, step_share: float = FIRST_STEP
+    ):
         self.timing, self.step_share = timing, step_share
         super().__init__(as_logged(case))
         self.nominals = tuple(self._scaled(n) for n in self.nominals)

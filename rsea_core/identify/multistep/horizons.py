@@ -27,6 +27,7 @@ from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     DOUBTED_SHARE,
     FINE_STEPS,
+    FIRST_STEP,
     HORIZONS,
     LEAST_ROWS,
     LEAST_STEP,
@@ -185,7 +186,7 @@ def _grown(
         ends = [_in_own_noise(trial, fit)]
         if output_errors:
             ends.append(_from_output_error(trial, h, x, known))
-        trial, fit = likelier(*ends)
+        trial, fit = with_fine_steps(*likelier(*ends), say)
         error = relative_error(trial, h, fit.x)
         say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")
         if known and error > LOST:
@@ -260,17 +261,27 @@ def _long_enough(estimator: Estimator, horizon: float) -> bool:
     )
 
 
-def with_fine_steps(estimator, base, case, say) -> tuple[Estimator, Estimate]:
+def with_fine_steps(
+    estimator: Estimator, base: Estimate, say, *, longest: float = FIRST_STEP
+) -> tuple[Estimator, Estimate]:
     """The same fit with engine steps so short that no innovation shows them.
 
     The engine's error falls with the square of its step: what half of it changes tells what is
     needed. Noise that was estimated beside that error holds it, so that one look is not enough.
+
+    Parameters
+    ----------
+    longest : float
+        Share of a hundredth of the fastest cycle that a step may have.
     """
     h = base.hypothesis
+    if estimator.problem.step_share > longest:
+        estimator = _in_steps(estimator, longest)
+        base = estimator.fit(h, base.x)
     for _ in range(STEP_ROUNDS):
         share = estimator.problem.step_share
         before = estimator.innovations([(h, base.x)])
-        after = _in_steps(estimator, case, 0.5 * share).innovations([(h, base.x)])
+        after = _in_steps(estimator, 0.5 * share).innovations([(h, base.x)])
         error = max(
             float(np.sqrt(np.mean((e - f) ** 2))) for e, f in zip(before, after, strict=True)
         )
@@ -279,7 +290,7 @@ def with_fine_steps(estimator, base, case, say) -> tuple[Estimator, Estimate]:
         wanted = share * np.sqrt(0.5 * STEP_ERROR / (RICHARDSON * error))
         share = max(min(wanted, 0.5 * share), LEAST_STEP)
         say(f"steps moved the innovations by {error:.2g} deviations: {share:.2g} of them now")
-        estimator = _in_steps(estimator, case, share)
+        estimator = _in_steps(estimator, share)
         estimator = with_noise(estimator, h, estimator.fit(h, base.x).x, steps=NOISE_STEPS)
         smooth(estimator, h, base.x)
         estimator = estimator.having([prepared(t) for t in estimator.tracks])
@@ -287,9 +298,10 @@ def with_fine_steps(estimator, base, case, say) -> tuple[Estimator, Estimate]:
     return estimator, base
 
 
-def _in_steps(estimator: Estimator, case: Case, share: float) -> Estimator:
+def _in_steps(estimator: Estimator, share: float) -> Estimator:
     """The estimator with experiments in other steps."""
-    other = MultistepProblem(case, timing=estimator.problem.timing, step_share=share)
+    problem = estimator.problem
+    other = MultistepProblem(problem.case, timing=problem.timing, step_share=share)
     tracks = [
         prepared(replace(t, experiment=e))
         for t, e in zip(estimator.tracks, other.fitted, strict=True)
@@ -314,15 +326,17 @@ def parameters_with_timing(
         timing = better[0].problem.timing
         if timing == AS_LOGGED:
             return better
-        first = parameters(MultistepProblem(case, timing=timing), h, say)  # others bent the values
+        problem = MultistepProblem(case, timing=timing, step_share=better[0].problem.step_share)
+        first = parameters(problem, h, say)  # the other timing bent the values
         first = _best_of(better, first)
+        first = (*with_better_timing(*first[:2], case, say), first[2])  # by values that now hold
         if quick or not _in_doubt(first):
             return first
     say("the fit may be in a wrong place: grown again from output errors")
-    ends = [first] + [
-        parameters(MultistepProblem(case, timing=each), h, say, output_errors=True)
-        for each in ((AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,))
-    ]
+    share, ends = first[0].problem.step_share, [first]
+    for each in (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,):
+        problem = MultistepProblem(case, timing=each, step_share=share)
+        ends.append(parameters(problem, h, say, output_errors=True))
     return _best_of(*ends)
 
 

@@ -29,6 +29,7 @@ from rsea_core.identify.spring_bench.loops import (
 )
 from rsea_core.identify.spring_bench.regression import (
     ASYMMETRY,
+    LAG,
     PIECES,
     SLIP,
     Bench,
@@ -188,7 +189,7 @@ def _search(bench: Bench) -> tuple[Bench, list[Fit]]:
         if not found:
             break
         current = min(found, key=lambda fit: fit.error)
-        if SLIP in current.pieces:
+        if {SLIP, LAG} & set(current.pieces):
             bench, current = bench.refined(current)
     tried = [fit for fit in tried if fit.pieces != current.pieces and np.isfinite(fit.error)]
     return bench, [*tried, current]

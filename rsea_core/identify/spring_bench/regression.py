@@ -16,7 +16,7 @@ slipped moves their zero.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
@@ -42,7 +42,11 @@ REACHES = np.geomspace(0.01, 1.2, 48)  # of the deflection's range
 COARSE = 4  # of these for the second slider
 TIMES = np.geomspace(1.0, 1000.0, 10)  # of the time between rows
 FOLDS = 4  # of a recording, each in turn predicted from the rest
-FINE = (np.geomspace(0.9, 1.1, 9), np.geomspace(0.99, 1.01, 5))  # of a reach that was found
+FINE = {  # factors on a value that was found, and on the best of these
+    SLIP: ("reach_rad", (np.geomspace(0.9, 1.1, 9), np.geomspace(0.99, 1.01, 5))),
+    LAG: ("time_s", (np.geomspace(0.6, 1.7, 9), np.geomspace(0.9, 1.1, 9),
+                     np.geomspace(0.98, 1.02, 9))),
+}  # fmt: skip
 BLOCKS = 6  # of a recording, for standard errors
 UNLOADED = 0.05  # of the torque's range: less than this at the start is no load
 FIRST = 3  # rows that may show where a recording starts; a ramp leaves it at once
@@ -144,8 +148,8 @@ class Bench:
         Its onset of contact.
     timed : bool
         False where time is only an index: no explanation may then use it.
-    reaches : tuple of float
-        More reaches of sliders to try, of the deflection's range.
+    finer : tuple of Column
+        More reaches of sliders and times of a lag to try.
     """
 
     def __init__(
@@ -155,10 +159,10 @@ class Bench:
         design: SpringCurve | None,
         *,
         timed: bool,
-        reaches: Sequence[float] = (),
+        finer: Sequence[Column] = (),
     ):
         self.rows, self.table, self.design, self.timed = tuple(rows), table, design, timed
-        self.extra = tuple(reaches)
+        self.extra = tuple(finer)
         self.reach = max(float(np.ptp(r.deflection_rad)) for r in rows)
         self.onset = 0.0
         if design is not None and any(design.contact_onset_rad):
@@ -176,9 +180,10 @@ class Bench:
                 for t in (TIMES if timed else ())
                 if t * step < 0.25 * longest
             ),
-            *(Column(piece=SLIP, parameters={"reach_rad": y * self.reach}) for y in self.extra),
+            *self.extra,
         )
-        self.coarse = sum(c.piece == SLIP for c in self.columns) - len(self.extra)
+        own = self.columns[: len(self.columns) - len(self.extra)]
+        self.coarse = sum(c.piece == SLIP for c in own)
         self.sums = [self._folds(r) for r in self.rows]
         self.spread = sum(float(np.sum((r.torque_Nm - r.torque_Nm.mean()) ** 2)) for r in rows)
 
@@ -221,20 +226,16 @@ class Bench:
         return tuple(found)
 
     def refined(self, fit: Fit) -> tuple["Bench", Fit]:
-        """The same recordings with finer reaches about those of a fit, and the fit with them.
+        """The same recordings with finer reaches and times about those of a fit, and the fit.
 
         Columns that were there keep their places.
         """
         bench = self
-        for factors in FINE:
-            found = [
-                bench.columns[j].parameters["reach_rad"] / self.reach
-                for j in fit.columns
-                if bench.columns[j].piece == SLIP
-            ]
-            more = tuple(float(y * f) for y in found for f in factors)
+        for stage in range(max(len(stages) for _, stages in FINE.values())):
+            found = [bench.columns[j] for j in fit.columns if bench.columns[j].piece in FINE]
+            more = tuple(near for column in found for near in _near(column, stage))
             bench = Bench(
-                self.rows, self.table, self.design, timed=self.timed, reaches=(*bench.extra, *more)
+                self.rows, self.table, self.design, timed=self.timed, finer=(*bench.extra, *more)
             )
             fit = bench.fit(fit.pieces)
         return bench, fit
@@ -367,6 +368,17 @@ class Bench:
     def per_stiffness(self) -> float:
         """Of one Nm/rad, in the design's stiffness."""
         return 1.0 / self.stiffness
+
+
+def _near(column: Column, stage: int) -> list[Column]:
+    """Columns of the same piece with values near its own."""
+    name, stages = FINE[column.piece]
+    value = column.parameters[name]
+    return [
+        replace(column, parameters={name: float(value * f)})
+        for factors in stages[stage : stage + 1]
+        for f in factors
+    ]
 
 
 def offset_of(r: BenchRows, error: NDArray) -> float:
