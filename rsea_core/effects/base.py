@@ -185,6 +185,8 @@ class Term(ABC):
         How it is drawn; None where a number says it all.
     relevant : RelevantSize or None
         The size at which it would matter, of its first law.
+    form_spread : float
+        Share by which a figure differs with what recordings rarely show of the effect's form.
     """
 
     effect: ClassVar[str]
@@ -196,6 +198,7 @@ class Term(ABC):
     figure_units: ClassVar[Mapping[str, str]] = {}
     curve: ClassVar = None
     relevant: ClassVar = None
+    form_spread: ClassVar[float] = 0.0
 
     def __post_init__(self):
         require_bounds(self)

@@ -83,8 +83,8 @@ class ContactNonlinear(Term):
 
     exponent: float = parameter(
         unit="-",
-        bounds=(1.0, 3.0),
-        source="1 linear, 1.5 Hertz",
+        bounds=(0.5, 3.0),
+        source="1 linear, 1.5 Hertz; below 1 foam that buckles",
         meaning="Power of the depth with which the contact torque grows.",
     )
     reference_depth_rad: float = parameter(
@@ -123,7 +123,8 @@ class ContactNonlinear(Term):
         """A power, without and with losses."""
         if "contact" not in typical.loads:
             return ()
-        power = Unknown(name="exponent", unit="-", low=1.0, high=3.0, scale=0.05)
+        softest = 0.5 if typical.relative else 1.0
+        power = Unknown(name="exponent", unit="-", low=softest, high=3.0, scale=0.05)
         loss = Unknown(name="loss_factor_s_per_rad", unit="s/rad", low=0.0, high=5.0, scale=0.1,
                        prior=1.0)  # fmt: skip
         common = {"effect": cls.effect, "subsystem": "environment", "write": _write, "kind": cls}
@@ -135,7 +136,7 @@ class ContactNonlinear(Term):
                 Unknown(name="reference_depth_rad", unit="rad", low=0.02 * depth, high=50 * depth,
                         scale=0.2, log=True, prior=1.0),
             )  # fmt: skip
-            starts = tuple((n, depth) for (n,) in (*starts, (2.0,)))
+            starts = tuple((n, depth) for (n,) in (*starts, (2.0,), (0.8,)))
         return (
             Law(law="power", unknowns=unknowns, starts=starts, richer=("hunt-crossley",), **common),
             Law(law="hunt-crossley", unknowns=(*unknowns, loss), starts=((*starts[0], 0.2),),

@@ -96,7 +96,7 @@ from rsea_core.effects.load_disturbance import (  # noqa: F401
     PULSE_START,
     PULSE_TAPER,
 )
-from rsea_core.effects.load_drag import DRAG, drag_torque  # noqa: F401
+from rsea_core.effects.load_drag import DRAG, drag_damping, drag_torque  # noqa: F401
 from rsea_core.effects.load_flexibility import LINK_DAMPING, LINK_INERTIA, LINK_STIFFNESS  # noqa: F401
 from rsea_core.effects.load_friction import (  # noqa: F401
     LOAD_BRISTLE,

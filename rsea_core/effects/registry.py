@@ -33,6 +33,7 @@ from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_friction_angle import LoadFrictionAngle as LoadFrictionAngle
 from rsea_core.effects.load_drag import LoadDrag
+from rsea_core.effects.load_drag import PowerDrag as PowerDrag
 from rsea_core.effects.load_flexibility import LoadFlexibility
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.load_position_torque import LoadPositionTorque

@@ -15,6 +15,7 @@ from rsea_core.identify.result.corrected_model import FoundModel, heat_left, res
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
+from rsea_core.identify.window_fit import unknown_torque
 from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
@@ -236,6 +237,10 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
             f"{file}: its first two thirds were fitted, for no other recording lets the load move;"
             " the last third stayed held out"
         )
+        found.append(Finding(kind=Kind.METHOD, text=text))
+    left = unknown_torque(conclusion.estimator, conclusion.error)
+    if left is not None:
+        text = f"beside the model {left} is left: what is smaller than that is not seen"
         found.append(Finding(kind=Kind.METHOD, text=text))
     horizon = conclusion.found.horizon
     if horizon is not None:

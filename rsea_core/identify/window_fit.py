@@ -6,19 +6,24 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.candidates.rig_parameters import Nominal
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import Spread
 from rsea_core.identify.law_search.found import Step
 from rsea_core.identify.multistep.criteria import (
+    DELAY_ROWS,
+    DOUBTED_ERROR,
     RIVAL_SCALE,
     RIVAL_SHARE,
     UNBELIEVED,
+    UNKNOWN_SHARE,
     WITHIN_ROW,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.machine.inputs import POSITION_COMMAND
 
 DAMPING, INDUCTANCE = "viscous_Nms_per_rad", "terminal_inductance_H"
 RESISTANCE = "terminal_resistance_ohm"
@@ -90,6 +95,51 @@ def strained_value(problem: MultistepProblem, fit: FoundFit) -> Nominal | None:
             if change < WITHIN_ROW * row * (nominal.get(RESISTANCE) or np.inf):
                 moved[j] = 0.0
     return problem.nominals[int(np.argmax(moved))] if np.any(moved >= UNBELIEVED) else None
+
+
+def late_command(judged) -> dict | None:
+    """A delay of the command beyond what a log's own convention can be; not of a servo.
+
+    judged : `WindowVerdict`
+    """
+    if any(r.command_name == POSITION_COMMAND for r in judged.case.identification):
+        return None
+    for j, law in enumerate(judged.fit.hypothesis.laws):
+        if law.kind is not DriveDelay:
+            continue
+        delay = judged.laws[j]["delay_s"]
+        at = judged.index_of(j)
+        std = judged.spread.std[at] * law.unknowns[0].scale
+        row = max(t.experiment.recording.sample_time_s for t in judged.estimator.tracks)
+        latest = law.unknowns[0].high - 1e-3 * row
+        if DELAY_ROWS * row < delay < latest and delay > 5.0 * std:
+            return {
+                "name": law.effect, "subsystem": "drive", "confidence": 0.95,
+                "law": law.law, "class": [law.effect], "alternatives": [],
+                "parameters": {"delay_s": {"value": delay, "std": float(std), "unit": "s",
+                                           "at_bound": False}},
+            }  # fmt: skip
+    return None
+
+
+def unknown_torque(estimator: Estimator, error: float) -> str | None:
+    """The torque that no log holds and no law explains, in words; None if it is negligible.
+
+    Of the mean over `Scale.time_s`, the root mean square. `error` is that of the predictions over
+    the spread of the readings: where nothing pulls a machine back, a small torque moves it far.
+    """
+    found = []
+    for t in estimator.tracks:
+        size, usual = float(np.hypot(*t.noise.inputs[:2])), float(max(t.scale.torque_Nm))
+        found.append((size / usual if usual > 0.0 else 0.0, size, t.scale.time_s))
+    share, size, time_s = max(found)
+    if share < UNKNOWN_SHARE and error < DOUBTED_ERROR:
+        return None
+    unit = "N" if estimator.problem.case.rig.axis == "linear" else "Nm"
+    return (
+        f"an unknown torque of {size:.2g} {unit} over {time_s:.2g} s"
+        f" ({100.0 * share:.2g} % of the machine's)"
+    )
 
 
 def rungs_of(steps: Sequence[Step], parameters: FoundFit, fit: FoundFit) -> list[dict]:

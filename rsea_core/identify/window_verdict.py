@@ -7,7 +7,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.catalogue import of_one_body
 from rsea_core.identify.candidates.rig_parameters import place_of
@@ -20,7 +19,6 @@ from rsea_core.identify.law_search.hold_out import HeldOut, free_run, held_out
 from rsea_core.identify.law_search.longer_windows import error_left_beyond
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
-    DELAY_ROWS,
     DEPENDENT,
     DOUBTED_ERROR,
     NO_PREDICTION,
@@ -45,12 +43,13 @@ from rsea_core.identify.window_fit import (
     FoundFit,
     FoundSearch,
     fit_of,
+    late_command,
     rungs_of,
     spread_of,
     strained_value,
+    unknown_torque,
 )
 from rsea_core.identify.window_formula import gain_over_named, unnamed_formula
-from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
@@ -87,7 +86,7 @@ class WindowVerdict(Conclusion):
         self.unpredicted = self.error > NO_PREDICTION
         self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
-        self.delayed = _delay_of(self)
+        self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
         self.reason = _reason_of(self)
         self.verdict = self._verdict()
@@ -101,6 +100,12 @@ class WindowVerdict(Conclusion):
     def model_fit(self) -> FoundFit:
         """The fit that `model.toml` holds: parameters alone where the laws are refuted."""
         return self.search.parameters if self.refuted else self.fit
+
+    @property
+    def explained_down_to(self) -> str:
+        """What is left beside the model, in words."""
+        left = unknown_torque(self.estimator, self.error)
+        return super().explained_down_to + ("" if left is None else f" and {left}")
 
     def model_values(self) -> tuple[dict, list[dict]]:
         """Nominal values and laws' values of the model."""
@@ -321,28 +326,6 @@ def _reason_of(judged: WindowVerdict) -> str | None:
             "no law fits; the rig's values alone predict with an error of"
             f" {100 * judged.error:.1f} % of the spread, and the innovations are dependent"
         )
-    return None
-
-
-def _delay_of(judged: WindowVerdict) -> dict | None:
-    """A delay of the command beyond what a log's own convention can be; not of a servo."""
-    if any(r.command_name == POSITION_COMMAND for r in judged.case.identification):
-        return None
-    for j, law in enumerate(judged.fit.hypothesis.laws):
-        if law.kind is not DriveDelay:
-            continue
-        delay = judged.laws[j]["delay_s"]
-        at = judged.index_of(j)
-        std = judged.spread.std[at] * law.unknowns[0].scale
-        row = max(t.experiment.recording.sample_time_s for t in judged.estimator.tracks)
-        latest = law.unknowns[0].high - 1e-3 * row
-        if DELAY_ROWS * row < delay < latest and delay > 5.0 * std:
-            return {
-                "name": law.effect, "subsystem": "drive", "confidence": 0.95,
-                "law": law.law, "class": [law.effect], "alternatives": [],
-                "parameters": {"delay_s": {"value": delay, "std": float(std), "unit": "s",
-                                           "at_bound": False}},
-            }  # fmt: skip
     return None
 
 

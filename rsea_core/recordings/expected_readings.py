@@ -14,6 +14,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.recordings.recording import Recording
 
 SLOWEST_MODE_s = 0.1  # averages last as long where the rig file does not say how slow it swings
+EMF_UNSURE = 0.03  # of the back-EMF: tolerances of its constant and of the supply
 PERIODS = 2.0  # of the slowest resonance that an average lasts
 
 
@@ -62,16 +63,9 @@ def expected_readings(rig: Rig, r: Recording, floors: dict[str, float]) -> list[
             both = float(np.hypot(stiffness * deflected[1], floors["torque_Nm"]))
             phrase = f"spring_stiffness_Nm_per_rad times {source}"
             found.append(_expected("torque_Nm", phrase, r, stiffness * deflected[0], both))
-    volts = winding_voltage(rig, r)
-    if volts is not None and rig.terminal_resistance_ohm and "current_A" in r.responses:
-        speed = 0.0
-        if output is not None:
-            speed = np.gradient(r["motor_angle_rad"], r.sample_time_s)
-        volts = volts - (rig.back_emf_constant_Vs_per_rad or 0.0) * speed
-        limit = rig.current_limit_A or np.inf
-        current = np.clip(volts / rig.terminal_resistance_ohm, -limit, limit)
-        phrase = "the current that the winding's voltage drives"
-        found.append(_expected("current_A", phrase, r, current, floors["current_A"]))
+    current = _winding_current(rig, r, floors)
+    if current is not None:
+        found.append(current)
     for side in ("motor", "load"):
         angle, speed = f"{side}_angle_rad", f"{side}_velocity_rad_per_s"
         if {angle, speed} <= set(r.responses):
@@ -79,6 +73,37 @@ def expected_readings(rig: Rig, r: Recording, floors: dict[str, float]) -> list[
             floor = float(np.hypot(floors[speed], floors[angle] / SLOWEST_MODE_s))
             found.append(_expected(speed, f"the speed of {angle}", r, slope, floor))
     return found
+
+
+def _winding_current(rig: Rig, r: Recording, floors: dict[str, float]) -> ExpectedReading | None:
+    """The current by voltage and speed; none where no column shows how fast the motor turns."""
+    volts, resistance = winding_voltage(rig, r), rig.terminal_resistance_ohm
+    speed = _motor_speed(rig, r)
+    if volts is None or not resistance or speed is None or "current_A" not in r.responses:
+        return None
+    emf = (rig.back_emf_constant_Vs_per_rad or 0.0) * speed
+    if np.std(volts - emf) < EMF_UNSURE * np.std(emf):
+        return None  # near its speed without load a small difference of two large voltages
+    limit = rig.current_limit_A or np.inf
+    current = np.clip((volts - emf) / resistance, -limit, limit)
+    source = "the current that the winding's voltage drives"
+    return _expected("current_A", source, r, current, floors["current_A"])
+
+
+def _motor_speed(rig: Rig, r: Recording) -> NDArray | float | None:
+    """Of the rotor, by the columns that show it; zero where the load is locked."""
+    if "motor_angle_rad" in r.responses:
+        return np.gradient(r["motor_angle_rad"], r.sample_time_s)
+    if "motor_velocity_rad_per_s" in r.responses:
+        return r["motor_velocity_rad_per_s"]
+    if r.load.kind == "locked" or not rig.back_emf_constant_Vs_per_rad:
+        return 0.0
+    ratio = rig.gear_ratio or 1.0
+    if "load_velocity_rad_per_s" in r.responses:
+        return ratio * r["load_velocity_rad_per_s"]
+    if "load_angle_rad" in r.responses:
+        return ratio * np.gradient(r["load_angle_rad"], r.sample_time_s)
+    return None
 
 
 def gear_output_angle(

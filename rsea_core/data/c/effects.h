@@ -136,9 +136,15 @@ static double rsea_position_torque(double angle) {
     }
     return value / 6.0;
 }
+/* Drag of the load over its speed; E_load_drag_beyond_square: its power less two. */
+static double rsea_drag_damping(double speed) {
+    const double size = fabs(speed);
+    if (E_load_drag_beyond_square == 0.0 || size == 0.0) return E_load_drag * size;
+    return E_load_drag * size * pow(size / 5.0, E_load_drag_beyond_square);
+}
 /* Smooth torque on the load by its angle and speed. */
 static double rsea_load_torque(double angle, double speed) {
-    double torque = -E_load_drag * speed * fabs(speed)
+    double torque = -rsea_drag_damping(speed) * speed
         - E_parallel_stiffness * (angle - E_parallel_rest_angle);
     if (E_unbalance_torque != 0.0) torque -= E_unbalance_torque * sin(angle + E_unbalance_angle);
     if (E_position_step != 0.0) torque += rsea_position_torque(angle);

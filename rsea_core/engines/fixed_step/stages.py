@@ -208,7 +208,7 @@ def _torques(machine, fx, drive, spring, applied, bodies, means):
             gear -= fx[e.ATAN_LEVEL] * np.arctan(x) - steep * means.gear
             damping += steep
         if fx[e.DRAG] != 0.0:
-            load_damping += fx[e.DRAG] * abs(means.load)
+            load_damping += e.drag_damping(fx, means.load)
         if machine.link:
             load -= link
     return Torques(gear, damping, joined, -spring.lever * joined, load, load_damping, link)

@@ -56,7 +56,7 @@ DELAYS = (
 )
 """Rows: starts of a late command."""
 DELAYS_FITTED = 4  # of these, the best
-DELAY_FIT = 2  # iterations from each of them
+DELAY_FIT = 1  # iterations from each of them
 EVENT = 0.5  # time scales of the motion: shortest stretch of a gain
 LEAST_RATIO = 2.5  # of the gain to its deviation between stretches of rows
 FASTEST = 0.3  # cycles per row: a faster motion is not seen
@@ -103,6 +103,7 @@ LEAST_INDEPENDENT = 0.1  # of that share, for a law that gains evenly is one of 
 HIGHEST, UNCLAIMED = 0.97, 0.45  # confidences
 FURTHER = (1.0, 0.9)  # factors of the first and the second law's
 FURTHER_RATIO_AT, FURTHER_RATIO_SCALE = 11.0, 1.0  # gain over its deviation of a further law
+UNKNOWN_SHARE = 0.005  # of the machine's torque: an unknown one below it is not worth a word
 DELAY_ROWS = 1.75  # a command that acts later than this is the drive's, not the log's
 WORSE = -2.0  # that a law may lose on recordings held out and stay in the model
 SILENT = 2.0  # gain or loss there from which recordings held out say something

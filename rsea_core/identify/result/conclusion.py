@@ -78,6 +78,11 @@ class Conclusion:
         if self.residual is not None and not self._runs_by_laws(self.residual):
             self._fit_jointly(self.residual)
 
+    @property
+    def explained_down_to(self) -> str:
+        """What is left beside the model, in words."""
+        return "the sensors' noise"
+
     def predicted(self, bench, hypothesis: Hypothesis, x: NDArray) -> NDArray:
         """Readings (n, p) that unknowns (u,) of a hypothesis predict for a whole recording."""
         return self.problem.predict(bench, hypothesis, x[None])[0]

@@ -59,7 +59,7 @@ GEAR = (
 LOAD = (
     LoadFriction(coulomb_Nm=0.1, stribeck_rise=0.4, normal_lever_m=5e-3),
     r.LoadFrictionAngle(coulomb_Nm=0.1, share=0.4, phase_rad=0.2),
-    r.LoadDrag(torque_at_5_rad_per_s_Nm=0.5),
+    r.PowerDrag(torque_at_5_rad_per_s_Nm=0.5, exponent=2.4),
     r.LoadUnbalance(torque_amplitude_Nm=0.5, angle_rad=0.3),
     r.SpringParallel(stiffness_Nm_per_rad=2.0),
     r.LoadPositionTorque(

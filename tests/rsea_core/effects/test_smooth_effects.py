@@ -25,6 +25,7 @@ from rsea_core.effects import (
     LoadUnbalance,
     MotorCogging,
     OffsetDeadZone,
+    PowerDrag,
     RoundedDeadZone,
     SensorNoise,
     SensorTable,
@@ -103,6 +104,10 @@ CASES = {
     "load-drag": (
         LoadDrag(torque_at_5_rad_per_s_Nm=2.0),
         {"on_load": lambda t, a, s: -2.0 / 25.0 * s * abs(s)},
+    ),
+    "load-drag, power": (
+        PowerDrag(torque_at_5_rad_per_s_Nm=2.0, exponent=2.7),
+        {"on_load": lambda t, a, s: -2.0 * np.sign(s) * abs(s / 5.0) ** 2.7},
     ),
     "load-unbalance": (
         LoadUnbalance(torque_amplitude_Nm=0.4, angle_rad=0.6),

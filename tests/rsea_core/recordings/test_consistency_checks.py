@@ -173,6 +173,23 @@ def test_a_logged_velocity_shows_that_an_angle_is_dead_or_of_another_unit():
     assert any("load_velocity_rad_per_s moves although" in text for text in found)
 
 
+def test_the_windings_current_is_compared_by_whatever_column_shows_the_motors_speed():
+    r = recorded("free")
+    ratio = RIG.gear_ratio
+    speed = {"motor_velocity_rad_per_s": np.gradient(r["motor_angle_rad"], ROW_s)}
+    others = ({"load_angle_rad": r["load_angle_rad"]},
+              {"load_velocity_rad_per_s": speed["motor_velocity_rad_per_s"] / ratio})  # fmt: skip
+    kept = {name: r[name] for name in ("time_s", "duty", "current_A")}
+    for read in (speed, *others):
+        assert inconsistencies(RIG, replace(r, columns=kept | read)) == []
+        wrong = kept | read | {"current_A": -r["current_A"]}
+        found = sentences(inconsistencies(RIG, replace(r, columns=wrong)))
+        assert any("current_A runs against" in text for text in found)
+    # nothing shows how fast it turns: a back-EMF of unknown size is no contradiction
+    unseen = replace(r, columns=kept | {"current_A": 0.1 * r["current_A"]})
+    assert inconsistencies(RIG, unseen) == []
+
+
 def test_a_motor_that_starts_without_a_command_was_driven():
     rest = np.maximum(np.arange(ROWS) - 100, 0)
     r = recorded(duty=lambda v: 0.0 * v, motor_angle_rad=lambda v: v[rest])

@@ -29,6 +29,7 @@ from rsea_core.effects import (
     LoadUnbalance,
     MotorCogging,
     OffsetDeadZone,
+    PowerDrag,
     RoundedDeadZone,
     SpringBoucWen,
     SpringHardening,
@@ -93,6 +94,7 @@ TERMS = {
     "spring-parallel": (SpringParallel(stiffness_Nm_per_rad=2.0),),
     "load-friction": (LoadFriction(coulomb_Nm=0.08, stribeck_rise=0.4),),
     "load-drag": (LoadDrag(torque_at_5_rad_per_s_Nm=1.0),),
+    "load-drag, power": (PowerDrag(torque_at_5_rad_per_s_Nm=1.0, exponent=1.6),),
     "load-unbalance": (LoadUnbalance(torque_amplitude_Nm=0.2, angle_rad=1.0),),
     "load-position-torque": (
         LoadPositionTorque(

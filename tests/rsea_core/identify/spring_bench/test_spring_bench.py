@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from dftfs.analysis.study.actuator import spring_curve
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import InputError
+from rsea_core.identify.spring_bench.effects import figures_of
 from rsea_core.identify.spring_bench.explanations import diagnose_spring, stop
 from rsea_core.identify.spring_bench.loops import measure_spring, turns
 from rsea_core.identify.spring_bench.regression import fading
@@ -95,6 +96,17 @@ def test_a_relaxing_spring_is_stiffer_the_faster_it_is_turned():
     assert "lag" in found.best.pieces
     assert found.best.parameters["lag_coefficient"] > 0.0
     assert "stiffer the faster" in found.sentence
+
+
+@pytest.mark.parametrize("time_s", [0.9, 5.5])  # between the times that are tried first
+def test_the_relaxation_time_and_the_rise_of_stiffness_err_by_what_is_stated(time_s):
+    law = lambda x, t: K * x + 0.3 * K * fading(x, t, time_s)  # noqa: E731
+    found = figures_of(diagnose_spring(BENCH, loops(law, (0.2, 0.12))), ("lag",))
+    for name, true in (("time_s", time_s), ("stiffness_rise_fast_over_static", 1.3)):
+        value, std = found[name]["value"], found[name]["std"]
+        assert 0.0 < std < 0.03 * true
+        # half of the finest step between the times that are tried, 0.25 %
+        assert value == pytest.approx(true, abs=3.0 * std + 2.5e-3 * true)
 
 
 def test_two_explanations_are_found_together():
