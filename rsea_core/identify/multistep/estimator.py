@@ -21,7 +21,8 @@ MOST_KEPT = 1e8  # bytes of residuals
 LONGEST_STEP = 3.0
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
-ENOUGH = 1e-3  # relative fall of the cost below which a fit has arrived
+ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
+NEGLIGIBLE = 0.05  # units that no step is worth
 FORESEEN = 0.5  # share of the foreseen fall, below which a corrected Jacobian is taken anew
 CORRECTIONS = 4  # of one Jacobian
 
@@ -203,9 +204,9 @@ class Estimator:
                     arrived = fresh
                     break
                 moved, fall = step.x - x, cost - step.cost
-                little = fall < max(ENOUGH * abs(cost) * 1e-2, 0.05)
+                little = fall < max(ENOUGH * abs(cost), NEGLIGIBLE)
                 arrived = fresh and little
-                if arrived:  # x stays where its Jacobian is known: the next fit begins there
+                if fresh and fall < NEGLIGIBLE:  # the next fit begins where a Jacobian is known
                     break
                 foreseen = -float(g @ moved + 0.5 * moved @ A @ moved)
                 x, cost = step.x, step.cost
