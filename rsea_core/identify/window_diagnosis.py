@@ -15,7 +15,6 @@ from rsea_core.identify.result.corrected_model import FoundModel, heat_left, res
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
-from rsea_core.identify.window_fit import unknown_torque
 from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
@@ -238,9 +237,8 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
             " the last third stayed held out"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
-    left = unknown_torque(conclusion.estimator, conclusion.error)
-    if left is not None:
-        text = f"beside the model {left} is left: what is smaller than that is not seen"
+    if conclusion.left is not None:
+        text = f"beside the model {conclusion.left} is left: what is smaller is not seen"
         found.append(Finding(kind=Kind.METHOD, text=text))
     horizon = conclusion.found.horizon
     if horizon is not None:

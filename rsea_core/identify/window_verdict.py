@@ -83,6 +83,7 @@ class WindowVerdict(Conclusion):
         self.strained = None if found.steps else strained_value(self.problem, self.fit)
         h = self.fit.hypothesis
         self.error = relative_error(self.estimator, h, self.fit.x)
+        self.left = unknown_torque(self.estimator, self.error)
         self.unpredicted = self.error > NO_PREDICTION
         self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
@@ -100,12 +101,6 @@ class WindowVerdict(Conclusion):
     def model_fit(self) -> FoundFit:
         """The fit that `model.toml` holds: parameters alone where the laws are refuted."""
         return self.search.parameters if self.refuted else self.fit
-
-    @property
-    def explained_down_to(self) -> str:
-        """What is left beside the model, in words."""
-        left = unknown_torque(self.estimator, self.error)
-        return super().explained_down_to + ("" if left is None else f" and {left}")
 
     def model_values(self) -> tuple[dict, list[dict]]:
         """Nominal values and laws' values of the model."""

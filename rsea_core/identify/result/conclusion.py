@@ -53,10 +53,11 @@ class Conclusion:
         The case with all its rows, which findings are about; None: the one that was searched.
     """
 
+    left: str | None = None  # an unknown torque beside the model, in words
+
     def __init__(self, search: Search, recorded: Case | None = None):
         self.search, self.problem = search, search.problem
-        self.case: Case = search.problem.case
-        self.recorded = recorded or self.case
+        self.case, self.recorded = search.problem.case, recorded or search.problem.case
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.spread, self.hessian = covariance(
@@ -77,11 +78,6 @@ class Conclusion:
             self.nearest, self.residual = self.effects(), unexplained_residual(search)
         if self.residual is not None and not self._runs_by_laws(self.residual):
             self._fit_jointly(self.residual)
-
-    @property
-    def explained_down_to(self) -> str:
-        """What is left beside the model, in words."""
-        return "the sensors' noise"
 
     def predicted(self, bench, hypothesis: Hypothesis, x: NDArray) -> NDArray:
         """Readings (n, p) that unknowns (u,) of a hypothesis predict for a whole recording."""

@@ -28,7 +28,7 @@ class ReportedDiagnosis(Protocol):
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
     restored_constants: Sequence[str]
-    explained_down_to: str
+    left: str | None
 
     def effects(self) -> Sequence[Mapping]:
         """The effects as they are reported, each with its confidence."""
@@ -51,7 +51,8 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     if conclusion.question is not None:
         return conclusion.question.sentence
     if verdict == "no-mismatch":
-        return f"The rig file explains the recordings down to {conclusion.explained_down_to}."
+        left = "" if conclusion.left is None else f" and {conclusion.left}"
+        return f"The rig file explains the recordings down to the sensors' noise{left}."
     if verdict == "parameters-only":
         moved = [
             f"{p.key} {p.value:.4g} -> {conclusion.nominal[p.key]:.4g}"
