@@ -192,8 +192,7 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
     """What else is worth knowing: of the experiment, of values far off, of the files."""
     found = [f for f in conclusion.recorded.notes() if f.kind is not Kind.RESAMPLED]
     found += [f for f in data_warnings(conclusion.recorded) if conclusion.stands(f)]
-    std = conclusion.spread.std
-    at = len(conclusion.problem.nominals)
+    std, at = conclusion.spread.std, len(conclusion.problem.nominals)
     for law, values in zip(conclusion.fit.hypothesis.laws, conclusion.laws, strict=True):
         count = sum(p.scale > 0.0 for p in law.unknowns)
         if law.nuisance and count == 1:

@@ -60,9 +60,8 @@ class Conclusion:
         self.case, self.recorded = search.problem.case, recorded or search.problem.case
         self.fit: Fit = search.best or search.parameters
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
-        self.spread, self.hessian = covariance(
-            search.fitter, self.fit, tempering=tempering_of(self.fit.msni)
-        )
+        share = tempering_of(self.fit.msni)
+        self.spread, self.hessian = covariance(search.fitter, self.fit, tempering=share)
         self.unbalance = unmodelled_gravity(self.search.fitter, self.fit, self.spread)
         self.verdict = verdict_of(search, self.fit, named_by_values=self.unbalance is not None)
         if self.verdict == "missing-physics" and self.laws and not self._shown(0):
