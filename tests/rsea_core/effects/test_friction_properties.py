@@ -137,17 +137,22 @@ def require_passive(terms, load, motor, load_angle):
     assert np.diff(result.energy.lost_J()).min() >= -1e-9 * max(stored[0], 1e-3)
 
 
+def require_passive_where_it_runs(terms, load, motor, load_angle):
+    """As `require_passive`; a spring of a corner of its box may be stiffer than any step."""
+    try:
+        require_passive(terms, load, motor, load_angle)
+    except InputError as refused:
+        if "the fastest mode" not in str(refused):
+            raise
+        reject()
+
+
 @FEW
 @given(st.data(), st.floats(-6.0, 6.0), st.floats(-0.2, 0.4))
 def test_no_passive_term_creates_energy_anywhere_in_its_box(data, motor, load_angle):
     names = data.draw(st.lists(st.sampled_from(PASSIVE), unique=True, min_size=1, max_size=4))
     terms = [within_box(data, name) for name in names]
-    try:
-        require_passive(terms, Load(kind="pendulum"), motor, load_angle)
-    except InputError as refused:  # a spring of a corner of its box is stiffer than any step
-        if "the fastest mode" not in str(refused):
-            raise
-        reject()
+    require_passive_where_it_runs(terms, Load(kind="pendulum"), motor, load_angle)
 
 
 @FEW
@@ -159,4 +164,5 @@ def test_nonlinear_contact_creates_no_energy_anywhere_in_its_box(data, motor, lo
         contact_angle_rad=0.1,
         contact_damping_Nms_per_rad=0.0,
     )
-    require_passive([within_box(data, "contact-nonlinear")], contact, motor, load_angle)
+    terms = [within_box(data, "contact-nonlinear")]
+    require_passive_where_it_runs(terms, contact, motor, load_angle)

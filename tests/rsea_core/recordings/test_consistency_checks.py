@@ -185,7 +185,7 @@ def test_the_windings_current_is_compared_by_whatever_column_shows_the_motors_sp
         wrong = kept | read | {"current_A": -r["current_A"]}
         found = sentences(inconsistencies(RIG, replace(r, columns=wrong)))
         assert any("current_A runs against" in text for text in found)
-    # nothing shows how fast it turns: a back-EMF of unknown size is no contradiction
+    # nothing shows how fast it turns: a back-EMF of unknown size proves nothing
     unseen = replace(r, columns=kept | {"current_A": 0.1 * r["current_A"]})
     assert inconsistencies(RIG, unseen) == []
 

@@ -15,8 +15,9 @@ from rsea_core.identify.law_search.gear_mesh import (
     first_laws,
     with_gear_mesh,
 )
+from rsea_core.identify.multistep.criteria import SEARCH_STEP
 from rsea_core.identify.multistep.experiment import MultistepProblem
-from rsea_core.identify.multistep.horizons import parameters
+from rsea_core.identify.multistep.horizons import parameters, with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.recordings.case import read_case
 
@@ -85,9 +86,14 @@ def cases(tmp_path_factory):
     return found
 
 
+def silent(_text):
+    pass
+
+
 def parameters_alone(case, more=()) -> Found:
     h = Hypothesis(laws=(*nuisances(case), *more))
-    own, base, horizon = parameters(MultistepProblem(case), h, lambda _: None)
+    own, base, horizon = parameters(MultistepProblem(case), h, silent)
+    own, base = with_fine_steps(own, base, silent, longest=SEARCH_STEP)  # as the search of laws
     return Found(problem=own.problem, base_estimator=own, base=base, estimator=own, best=base,
                  horizon=horizon)  # fmt: skip
 
