@@ -133,7 +133,7 @@ def unknown_torque(estimator: Estimator, error: float) -> str | None:
         size, usual = float(np.hypot(*t.noise.inputs[:2])), float(max(t.scale.torque_Nm))
         found.append((size / usual if usual > 0.0 else 0.0, size, t.scale.time_s))
     share, size, time_s = max(found)
-    if share < UNKNOWN_SHARE and error < DOUBTED_ERROR:
+    if size == 0.0 or (share < UNKNOWN_SHARE and error < DOUBTED_ERROR):
         return None
     unit = "N" if estimator.problem.case.rig.axis == "linear" else "Nm"
     return (
