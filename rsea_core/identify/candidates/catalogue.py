@@ -3,6 +3,8 @@
 from rsea_core.effects.base import Port, Term
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_friction_angle import LoadFrictionAngle
+from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.sensor_base import FITTED
@@ -12,6 +14,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 
 GEAR = GearFriction.effect
+ONCE_A_TURN = (LoadUnbalance, LoadFrictionAngle)  # of the load, which on a linear axis never turns
 
 
 def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
@@ -29,6 +32,8 @@ def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
     kinds = [kind for kind in _kinds() if there[kind.port]]
     if not rig.has("load"):
         kinds = [kind for kind in kinds if kind.effect not in of_one_body(rig) - {GEAR}]
+    if rig.axis == "linear":
+        kinds = [kind for kind in kinds if kind not in ONCE_A_TURN]
     laws = [law for kind in kinds for law in candidates_of(kind, s) if not _on_the_load(law, rig)]
     return {law.key: law for law in sorted(laws, key=_column)}
 

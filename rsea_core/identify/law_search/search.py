@@ -13,6 +13,7 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.sensor_offset import SensorOffset
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
@@ -82,6 +83,7 @@ from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case
 
+TORQUE_CONSTANT = "torque_constant_Nm_per_A"
 ANGLES = ("motor_angle_rad", "load_angle_rad")
 HOLDS_NO_CLAIM = (DriveDelay.effect, SensorNoise.effect)  # nuisances, or no physics
 
@@ -161,12 +163,18 @@ def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
 def _observable(law: Law, estimator: Estimator) -> bool:
     """Whether the readings can show a law of a sensor: two of them tell which one is late.
 
-    One angle alone shows no offset: it is an angle of gravity, or none at all.
+    One angle alone shows no offset: it is an angle of gravity, or none at all. One reading alone
+    shows no factor where a motor's torque constant is free: either multiplies the motion.
     """
     single = all(len(t.experiment.channels) == 1 for t in estimator.tracks)
     angles = max(_angles(t.experiment) for t in estimator.tracks)
-    unseen = law.kind is SensorOffset and law.sensor in ANGLES and angles < 2
-    return not unseen and not (law.kind is SensorDelay and single)
+    constant = any(p.key == TORQUE_CONSTANT for p in estimator.problem.nominals)
+    unseen = {
+        SensorOffset: law.sensor in ANGLES and angles < 2,
+        SensorDelay: single,
+        SensorScale: single and constant,
+    }
+    return not unseen.get(law.kind, False)
 
 
 def _angles(e: Experiment) -> int:

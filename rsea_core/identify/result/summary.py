@@ -73,6 +73,8 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     if verdict == "insufficient-data":
         near = [f.hypothesis for f, gap in conclusion.rivals() if gap < TEMPERATURE]
         others = ", ".join(dict.fromkeys(effect for h in near for effect in h.effects))
+        if not others:
+            return f"Likely {what}, but these recordings do not show it beyond doubt."
         return f"Likely {what}, but these recordings do not distinguish it from {others}."
     if conclusion.restored_constants and len(laws) == 1:
         some = constants_phrase(conclusion.restored_constants)

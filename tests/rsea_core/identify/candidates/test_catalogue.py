@@ -29,6 +29,12 @@ def test_an_axis_with_a_load_has_both_frictions_as_one_law_of_one_body(tmp_path)
     assert of_one_body(axis_rig()) == {"gear-friction", "load-friction"}
 
 
+def test_nothing_happens_once_a_turn_of_a_load_that_moves_along_a_line(tmp_path):
+    once_a_turn = {"load-unbalance", "load-friction-angle"}
+    assert once_a_turn <= effects(tmp_path, replace(axis_rig(), axis="rotary"))
+    assert not once_a_turn & effects(tmp_path, replace(axis_rig(), axis="linear"))
+
+
 def test_a_drag_on_a_bare_shaft_acts_in_the_model():
     drag = LoadDrag(torque_at_5_rad_per_s_Nm=0.1)
     plain, with_drag = (

@@ -9,6 +9,7 @@ from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.sensor_offset import SensorOffset
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_choice import promising, standing_out
@@ -25,7 +26,7 @@ from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.identify.multistep.log_nuisances import nuisances
-from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig, pendulum_case
 
 
 def silent(_):
@@ -128,12 +129,23 @@ def test_a_fit_that_was_stopped_is_continued_and_one_that_arrived_is_not(dry_fri
     assert again is None or gain_of(again[0], arrived[1], again[1]) < 4.0
 
 
-def test_one_angle_alone_shows_no_offset_and_no_reading_that_is_late(dry_friction):
-    """It would be an angle of gravity; which of two sensors is late needs both."""
+def test_one_angle_alone_shows_no_offset_no_factor_and_no_reading_that_is_late(dry_friction):
+    """They would be an angle of gravity and a torque constant; which one is late needs two."""
     found, _ = dry_friction
     tracks = found.base_estimator.tracks
     assert all(t.experiment.channels == ("motor_angle_rad",) for t in tracks)
     effects = {law.effect for law in laws_of(found)}
     assert SensorOffset.effect not in effects
     assert SensorDelay.effect not in effects
+    assert SensorScale.effect not in effects
     assert LoadFriction.effect in effects or GearFriction.effect in effects
+
+
+def test_one_angle_of_a_machine_without_a_motor_shows_a_factor(tmp_path):
+    """Gravity's period is known, and no torque constant is free."""
+    case = pendulum_case(tmp_path, seed=4)
+    h = Hypothesis(laws=nuisances(case))
+    own, base, horizon = parameters(MultistepProblem(case), h, lambda _: None)
+    found = Found(problem=own.problem, base_estimator=own, base=base, estimator=own, best=base,
+                  horizon=horizon)  # fmt: skip
+    assert SensorScale.effect in {law.effect for law in laws_of(found)}
