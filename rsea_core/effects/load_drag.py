@@ -114,8 +114,8 @@ class PowerDrag(LoadDrag):
 
     Source
     ------
-    Fans and paddles between laminar (1) and separated flow (2), generators as brakes and valves
-    above: White, Fluid Mechanics, ch. 7. The power is a fit.
+    White, Fluid Mechanics, ch. 7: in proportion to the speed in creeping flow, to its power 1.5
+    along a laminar boundary layer, to its square in separated flow. The power is a fit.
     """
 
     law: ClassVar[str] = "power"
