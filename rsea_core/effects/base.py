@@ -186,7 +186,7 @@ class Term(ABC):
     relevant : RelevantSize or None
         The size at which it would matter, of its first law.
     form_spread : float
-        Share by which a figure differs with what recordings rarely show of the effect's form.
+        Relative standard deviation of its figures from what recordings rarely show of the effect.
     """
 
     effect: ClassVar[str]

@@ -84,7 +84,7 @@ class ContactNonlinear(Term):
     exponent: float = parameter(
         unit="-",
         bounds=(0.5, 3.0),
-        source="1 linear, 1.5 Hertz; below 1 foam that buckles",
+        source="1 linear, 1.5 Hertz; below 1 softening, as of foam",
         meaning="Power of the depth with which the contact torque grows.",
     )
     reference_depth_rad: float = parameter(

@@ -216,7 +216,7 @@ class DriveThermal(Term):
         "resistance_rise_fraction": "-",
         "peak_winding_C": "C",
     }
-    form_spread: ClassVar[float] = 0.06  # magnets fall by 0 to 0.1 % per K: as much of copper's
+    form_spread: ClassVar[float] = 0.06  # magnets may weaken by 0 to 0.1 % per K as well
 
     winding_heat_capacity_J_per_K: float = parameter(
         unit="J/K",

@@ -15,7 +15,14 @@ from rsea_core.effects.load_base import HELD
 from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
-from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
+from rsea_core.effects.variant import (
+    Law,
+    RunConditions,
+    TrialMachine,
+    Unknown,
+    Values,
+    writes_numbers,
+)
 from rsea_core.machine.rig import Rig
 
 DRAG, BEYOND_SQUARE = slots("load_drag", "load_drag_beyond_square")
@@ -145,16 +152,14 @@ class PowerDrag(LoadDrag):
         if not typical.relative:  # the bench's speeds span too little to tell a power
             return ()
 
-        def parameters(v: Values, rig: Rig) -> Values:
-            factor = (SPEED_rad_per_s / speed) ** v["exponent"]
-            return {"torque_at_5_rad_per_s_Nm": v["torque_Nm"] * factor, "exponent": v["exponent"]}
+        def parameters(v: Values, rig: Rig | None) -> Values:
+            at_5 = v["torque_Nm"] * (SPEED_rad_per_s / speed) ** v["exponent"]
+            return {"torque_at_5_rad_per_s_Nm": at_5, "exponent": v["exponent"]}
 
         def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
-            if w.kind not in HELD:
-                at_5 = v["torque_Nm"] * (SPEED_rad_per_s / speed) ** v["exponent"]
-                d.put(DRAG, at_5 / SPEED_rad_per_s**2)
-                d.put(BEYOND_SQUARE, v["exponent"] - 2.0)
+            own_numbers(parameters(v, None), d, w)
 
+        own_numbers = writes_numbers(cls, moving_load=True)
         unknowns = (
             Unknown(name="torque_Nm", unit="Nm", low=0.0, high=100.0 * t, scale=0.05 * t),
             Unknown(name="exponent", unit="-", low=1.2, high=4.5, scale=0.1),

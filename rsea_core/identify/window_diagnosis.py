@@ -236,8 +236,8 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
             " the last third stayed held out"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
-    if conclusion.left is not None:
-        text = f"beside the model {conclusion.left} is left: what is smaller is not seen"
+    if conclusion.unknown_torque is not None:
+        text = f"the model leaves {conclusion.unknown_torque}: smaller effects cannot be detected"
         found.append(Finding(kind=Kind.METHOD, text=text))
     horizon = conclusion.found.horizon
     if horizon is not None:

@@ -135,10 +135,11 @@ def unknown_torque(estimator: Estimator, error: float) -> str | None:
     share, size, time_s = max(found)
     if size == 0.0 or (share < UNKNOWN_SHARE and error < DOUBTED_ERROR):
         return None
-    unit = "N" if estimator.problem.case.rig.axis == "linear" else "Nm"
+    linear = estimator.problem.case.rig.axis == "linear"
+    what, unit = ("force", "N") if linear else ("torque", "Nm")
     return (
-        f"an unknown torque of {size:.2g} {unit} over {time_s:.2g} s"
-        f" ({100.0 * share:.2g} % of the machine's)"
+        f"an unknown {what} of {size:.2g} {unit}, averaged over {time_s:.2g} s"
+        f" ({100.0 * share:.2g} % of the usual {what})"
     )
 
 

@@ -83,7 +83,7 @@ class WindowVerdict(Conclusion):
         self.strained = None if found.steps else strained_value(self.problem, self.fit)
         h = self.fit.hypothesis
         self.error = relative_error(self.estimator, h, self.fit.x)
-        self.left = unknown_torque(self.estimator, self.error)
+        self.unknown_torque = unknown_torque(self.estimator, self.error)
         self.unpredicted = self.error > NO_PREDICTION
         self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()

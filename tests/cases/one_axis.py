@@ -112,7 +112,9 @@ def axis_case(folder, *recordings: Recording, rig: Rig) -> Case:
     return Case(name="axis", folder=folder, rig=rig, recordings=recordings)
 
 
-def pendulum_case(folder, *terms, seed: int, start_rad: float = 2.0) -> Case:
+def pendulum_case(
+    folder, *terms, seed: int, start_rad: float = 2.0, row_s: float = ROW_s, counts: int = COUNTS
+) -> Case:
     """A bare pendulum let go once: one recording of twenty seconds."""
     rig = Rig(
         name="pendulum",
@@ -121,16 +123,16 @@ def pendulum_case(folder, *terms, seed: int, start_rad: float = 2.0) -> Case:
         load_mass_kg=0.2,
         load_distance_m=0.15,
         gravity_angle_offset_rad=0.0,
-        load_encoder_counts_per_rev=COUNTS,
+        load_encoder_counts_per_rev=counts,
     )
-    time = ROW_s * np.arange(2000)
+    time = row_s * np.arange(round(20.0 / row_s))
     inputs = Inputs(time_s=time, load=Load(kind="pendulum"), initial_load_angle_rad=start_rad,
                     initial_motor_angle_rad=start_rad)  # fmt: skip
     angle = Replay.of(inputs, step_s=1e-3).run(ActuatorModel(rig, terms))[:, 1]
-    count = 2.0 * np.pi / COUNTS
+    count = 2.0 * np.pi / counts
     read = count * np.round(angle / count)
     r = Recording(
-        file="release.csv", load=Load(kind="pendulum"), sample_time_s=ROW_s,
+        file="release.csv", load=Load(kind="pendulum"), sample_time_s=row_s,
         columns={"time_s": time, "load_angle_rad": read},
     )  # fmt: skip
     return Case(name="pendulum", folder=folder, rig=rig, recordings=(r,))

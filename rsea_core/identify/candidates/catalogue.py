@@ -14,7 +14,7 @@ from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case
 
 GEAR = GearFriction.effect
-ONCE_A_TURN = (LoadUnbalance, LoadFrictionAngle)  # of the load, which on a linear axis never turns
+ONCE_A_TURN = (LoadUnbalance, LoadFrictionAngle)  # of the load; a linear axis has no turns
 
 
 def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:

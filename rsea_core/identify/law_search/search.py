@@ -66,7 +66,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSE_CHOICE,
     PULSE_RATIO,
-    SEARCH_STEP,
+    SEARCH_STEPS,
     SECOND_STARTS,
     WEAK,
 )
@@ -103,7 +103,7 @@ def searched(
     estimator, base, horizon = parameters_with_timing(
         case, h, say, timing=timing, quick=quick or bool(mesh)
     )
-    estimator, base = with_fine_steps(estimator, base, say, longest=SEARCH_STEP)
+    estimator, base = with_fine_steps(estimator, base, say, per_cycle=SEARCH_STEPS)
     if not quick:
         estimator, base = settled(estimator, base)
     problem = estimator.problem
@@ -164,7 +164,7 @@ def _observable(law: Law, estimator: Estimator) -> bool:
     """Whether the readings can show a law of a sensor: two of them tell which one is late.
 
     One angle alone shows no offset: it is an angle of gravity, or none at all. One reading alone
-    shows no factor where a motor's torque constant is free: either multiplies the motion.
+    shows no scale factor where the torque constant is free: either one multiplies the motion.
     """
     single = all(len(t.experiment.channels) == 1 for t in estimator.tracks)
     angles = max(_angles(t.experiment) for t in estimator.tracks)

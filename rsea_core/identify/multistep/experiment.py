@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,7 +35,7 @@ from rsea_core.identify.multistep.command_timing import (
     even_times,
     runs_at,
 )
-from rsea_core.identify.multistep.criteria import FIRST_STEP
+from rsea_core.identify.multistep.criteria import FIRST_STEPS
 from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case, noise_floor
@@ -47,12 +48,30 @@ VELOCITIES = {
     "motor_angle_rad": "motor_velocity_rad_per_s",
     "load_angle_rad": "load_velocity_rad_per_s",
 }
-STEPS_PER_CYCLE = 100.0  # of the fastest swing
 LEAST_ROWS = 30  # of a recording
+LEAST_STEP_s = 1e-4  # of the engine, before it is made finer
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
 DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
                   "load_velocity_rad_per_s")  # fmt: skip
+
+
+class EngineSteps(NamedTuple):
+    """How long the engine's steps are.
+
+    Attributes
+    ----------
+    per_cycle : float
+        Steps in the fastest cycle, at least; there is at least one in a row.
+    fineness : float
+        Factor on the step that this gives, for every recording.
+    """
+
+    per_cycle: float = FIRST_STEPS
+    fineness: float = 1.0
+
+
+FIRST = EngineSteps()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,15 +160,9 @@ class Experiment:
 
 def experiment(
     model: ActuatorModel, r: Recording, where: RunConditions, *,
-    timing: CommandTiming = AS_LOGGED, step_share: float = FIRST_STEP,
+    timing: CommandTiming = AS_LOGGED, steps: EngineSteps = FIRST,
 ) -> Experiment:  # fmt: skip
-    """A recording under a command that is held from row to row, or moves linearly.
-
-    Parameters
-    ----------
-    step_share : float
-        Longest step of the engine, of a cycle's `STEPS_PER_CYCLE`-th part.
-    """
+    """A recording under a command that is held from row to row, or moves linearly."""
     finer = FINER if timing.linear and r.load.kind != "imposed" and r.command_name else 1
     inputs = r.inputs()
     even = None if timing.rows is RowTimes.LOGGED else even_times(r.time_s)
@@ -170,10 +183,10 @@ def experiment(
         more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)
     replay = Replay.of(inputs, **more)
     numbers = replay.numbers(model)
-    step = _step_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
-    stable = longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE
-    step = min(step_share * step, min(step_share, 1.0) * stable)
-    replay = Replay.of(inputs, step_s=step, **more)
+    cycle = _cycle_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
+    step = float(np.clip(cycle / steps.per_cycle, LEAST_STEP_s, r.sample_time_s))
+    step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
+    replay = Replay.of(inputs, step_s=steps.fineness * step, **more)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
     channels += tuple(v for a, v in VELOCITIES.items() if v in r.responses and a not in r)
     require_comparable(r, channels)
@@ -188,8 +201,8 @@ def experiment(
     )  # fmt: skip
 
 
-def _step_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
-    """Longest step: a share of the fastest swing of the machine, of gravity's, of the motion's."""
+def _cycle_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
+    """Period of the fastest swing: of the machine, of gravity's, of the motion's."""
     rates = [2.0 * np.pi / (r.time_s[-1] - r.time_s[0])]
     elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
     whole = plant.inertia + plant.load_inertia
@@ -205,7 +218,7 @@ def _step_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
         swing = np.sqrt(plant.volts_per_command / whole) if whole > 0.0 else np.inf
         rates.append(min(swing, plant.volts_per_command / damping))
     rates.append(_motion_rate(r))
-    return float(np.clip(2.0 * np.pi / max(rates) / STEPS_PER_CYCLE, 1e-4, r.sample_time_s))
+    return float(2.0 * np.pi / max(rates))
 
 
 def _motion_rate(r: Recording) -> float:
@@ -248,9 +261,9 @@ class MultistepProblem(Problem):
     reach = STATED_BOUND  # tolerances that a value which the rig file states may move
 
     def __init__(
-        self, case: Case, *, timing: CommandTiming = AS_LOGGED, step_share: float = FIRST_STEP
+        self, case: Case, *, timing: CommandTiming = AS_LOGGED, steps: EngineSteps = FIRST
     ):
-        self.timing, self.step_share = timing, step_share
+        self.timing, self.steps = timing, steps
         super().__init__(as_logged(case))
         self.nominals = tuple(self._scaled(n) for n in self.nominals)
 
@@ -307,5 +320,4 @@ class MultistepProblem(Problem):
         return bench.readings(bench.runs(machines, None), machines)
 
     def _bench(self, r: Recording, where: RunConditions) -> Experiment:
-        share = self.step_share
-        return experiment(self.model, r, where, timing=self.timing, step_share=share)
+        return experiment(self.model, r, where, timing=self.timing, steps=self.steps)

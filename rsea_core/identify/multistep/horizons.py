@@ -27,10 +27,10 @@ from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     DOUBTED_SHARE,
     FINE_STEPS,
-    FIRST_STEP,
+    FIRST_STEPS,
     HORIZONS,
+    LEAST_FINENESS,
     LEAST_ROWS,
-    LEAST_STEP,
     LINEAR_GAIN,
     LOST,
     OUTPUT_ERROR,
@@ -44,7 +44,11 @@ from rsea_core.identify.multistep.estimator import (
     Estimator,
     independent_share,
 )
-from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, MultistepProblem
+from rsea_core.identify.multistep.experiment import (
+    DELAY_STEP_ROWS,
+    EngineSteps,
+    MultistepProblem,
+)
 from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS, estimated_noise
 from rsea_core.identify.multistep.tracks import (
     Track,
@@ -262,7 +266,7 @@ def _long_enough(estimator: Estimator, horizon: float) -> bool:
 
 
 def with_fine_steps(
-    estimator: Estimator, base: Estimate, say, *, longest: float = FIRST_STEP
+    estimator: Estimator, base: Estimate, say, *, per_cycle: float = FIRST_STEPS
 ) -> tuple[Estimator, Estimate]:
     """The same fit with engine steps so short that no innovation shows them.
 
@@ -271,26 +275,27 @@ def with_fine_steps(
 
     Parameters
     ----------
-    longest : float
-        Share of a hundredth of the fastest cycle that a step may have.
+    per_cycle : float
+        Steps in the fastest cycle, at least.
     """
-    h = base.hypothesis
-    if estimator.problem.step_share > longest:
-        estimator = _in_steps(estimator, longest)
+    h, steps = base.hypothesis, estimator.problem.steps
+    if steps.per_cycle / steps.fineness < per_cycle:
+        estimator = _in_steps(estimator, EngineSteps(per_cycle))
         base = estimator.fit(h, base.x)
     for _ in range(STEP_ROUNDS):
-        share = estimator.problem.step_share
+        steps = estimator.problem.steps
+        half = steps._replace(fineness=0.5 * steps.fineness)
         before = estimator.innovations([(h, base.x)])
-        after = _in_steps(estimator, 0.5 * share).innovations([(h, base.x)])
+        after = _in_steps(estimator, half).innovations([(h, base.x)])
         error = max(
             float(np.sqrt(np.mean((e - f) ** 2))) for e, f in zip(before, after, strict=True)
         )
-        if not error > STEP_ERROR or share <= LEAST_STEP:
+        if not error > STEP_ERROR or steps.fineness <= LEAST_FINENESS:
             break
-        wanted = share * np.sqrt(0.5 * STEP_ERROR / (RICHARDSON * error))
-        share = max(min(wanted, 0.5 * share), LEAST_STEP)
-        say(f"steps moved the innovations by {error:.2g} deviations: {share:.2g} of them now")
-        estimator = _in_steps(estimator, share)
+        wanted = steps.fineness * np.sqrt(0.5 * STEP_ERROR / (RICHARDSON * error))
+        finer = steps._replace(fineness=float(np.clip(wanted, LEAST_FINENESS, half.fineness)))
+        say(f"steps moved the innovations by {error:.2g} deviations: {finer.fineness:.2g} of them")
+        estimator = _in_steps(estimator, finer)
         estimator = with_noise(estimator, h, estimator.fit(h, base.x).x, steps=NOISE_STEPS)
         smooth(estimator, h, base.x)
         estimator = estimator.having([prepared(t) for t in estimator.tracks])
@@ -298,15 +303,21 @@ def with_fine_steps(
     return estimator, base
 
 
-def _in_steps(estimator: Estimator, share: float) -> Estimator:
+def _in_steps(estimator: Estimator, steps: EngineSteps) -> Estimator:
     """The estimator with experiments in other steps."""
     problem = estimator.problem
-    other = MultistepProblem(problem.case, timing=problem.timing, step_share=share)
+    return _with_problem(
+        estimator, MultistepProblem(problem.case, timing=problem.timing, steps=steps)
+    )
+
+
+def _with_problem(estimator: Estimator, problem: MultistepProblem) -> Estimator:
+    """The estimator with the experiments of another problem, in the same windows and noise."""
     tracks = [
         prepared(replace(t, experiment=e))
-        for t, e in zip(estimator.tracks, other.fitted, strict=True)
+        for t, e in zip(estimator.tracks, problem.fitted, strict=True)
     ]
-    return Estimator(other, tracks, tempering=estimator.tempering, cache=estimator.cache)
+    return Estimator(problem, tracks, tempering=estimator.tempering, cache=estimator.cache)
 
 
 def parameters_with_timing(
@@ -326,16 +337,16 @@ def parameters_with_timing(
         timing = better[0].problem.timing
         if timing == AS_LOGGED:
             return better
-        problem = MultistepProblem(case, timing=timing, step_share=better[0].problem.step_share)
-        first = parameters(problem, h, say)  # the other timing bent the values
+        problem = MultistepProblem(case, timing=timing, steps=better[0].problem.steps)
+        first = parameters(problem, h, say)  # grown with this timing
         first = _best_of(better, first)
-        first = (*with_better_timing(*first[:2], case, say), first[2])  # by values that now hold
+        first = (*with_better_timing(*first[:2], case, say), first[2])  # with the new values
         if quick or not _in_doubt(first):
             return first
     say("the fit may be in a wrong place: grown again from output errors")
-    share, ends = first[0].problem.step_share, [first]
+    steps, ends = first[0].problem.steps, [first]
     for each in (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,):
-        problem = MultistepProblem(case, timing=each, step_share=share)
+        problem = MultistepProblem(case, timing=each, steps=steps)
         ends.append(parameters(problem, h, say, output_errors=True))
     return _best_of(*ends)
 
@@ -365,13 +376,8 @@ def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estim
     That of the file contract stands unless another one is likelier by `LINEAR_GAIN`.
     """
     least = -LINEAR_GAIN if timing == AS_LOGGED else LINEAR_GAIN
-    h, share = base.hypothesis, estimator.problem.step_share
-    problem = MultistepProblem(case, timing=timing, step_share=share)
-    tracks = [
-        prepared(replace(t, experiment=e))
-        for t, e in zip(estimator.tracks, problem.fitted, strict=True)
-    ]
-    other = Estimator(problem, tracks, tempering=estimator.tempering, cache=estimator.cache)
+    h, steps = base.hypothesis, estimator.problem.steps
+    other = _with_problem(estimator, MultistepProblem(case, timing=timing, steps=steps))
     fit = _with_best_delay(other, h, base.x)
     better = fit.cost < base.cost - least
     if not better and fit.cost < base.cost + 50.0:

@@ -53,7 +53,7 @@ class Conclusion:
         The case with all its rows, which findings are about; None: the one that was searched.
     """
 
-    left: str | None = None  # an unknown torque beside the model, in words
+    unknown_torque: str | None = None  # that the model leaves, in words
 
     def __init__(self, search: Search, recorded: Case | None = None):
         self.search, self.problem = search, search.problem

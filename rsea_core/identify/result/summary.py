@@ -28,7 +28,7 @@ class ReportedDiagnosis(Protocol):
     nearest: Sequence[Mapping]
     question: OpenQuestion | None
     restored_constants: Sequence[str]
-    left: str | None
+    unknown_torque: str | None
 
     def effects(self) -> Sequence[Mapping]:
         """The effects as they are reported, each with its confidence."""
@@ -51,7 +51,8 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     if conclusion.question is not None:
         return conclusion.question.sentence
     if verdict == "no-mismatch":
-        left = "" if conclusion.left is None else f" and {conclusion.left}"
+        torque = conclusion.unknown_torque
+        left = "" if torque is None else f" and {torque}"
         return f"The rig file explains the recordings down to the sensors' noise{left}."
     if verdict == "parameters-only":
         moved = [
@@ -74,7 +75,7 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
         near = [f.hypothesis for f, gap in conclusion.rivals() if gap < TEMPERATURE]
         others = ", ".join(dict.fromkeys(effect for h in near for effect in h.effects))
         if not others:
-            return f"Likely {what}, but these recordings do not show it beyond doubt."
+            return f"Likely {what}, but these recordings do not confirm it."
         return f"Likely {what}, but these recordings do not distinguish it from {others}."
     if conclusion.restored_constants and len(laws) == 1:
         some = constants_phrase(conclusion.restored_constants)
