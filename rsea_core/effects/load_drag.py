@@ -15,14 +15,7 @@ from rsea_core.effects.load_base import HELD
 from rsea_core.effects.relevant_size import RelevantSize, sized
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
-from rsea_core.effects.variant import (
-    Law,
-    RunConditions,
-    TrialMachine,
-    Unknown,
-    Values,
-    writes_numbers,
-)
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
 DRAG, BEYOND_SQUARE = slots("load_drag", "load_drag_beyond_square")
@@ -54,6 +47,19 @@ def _drag_torques(fx, speeds):
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     if w.kind not in HELD:
         d.put(DRAG, v["torque_at_5_rad_per_s_Nm"] / SPEED_rad_per_s**2)
+
+
+def _parameters(v: Values, rig: Rig | None) -> Values:
+    """Of a power law whose torque is that at a speed which the recordings reach."""
+    at_5 = v["torque_Nm"] * (SPEED_rad_per_s / v["speed_rad_per_s"]) ** v["exponent"]
+    return {"torque_at_5_rad_per_s_Nm": at_5, "exponent": v["exponent"]}
+
+
+def _write_power(v: Values, d: TrialMachine, w: RunConditions) -> None:
+    found = _parameters(v, None)
+    _write(found, d, w)
+    if w.kind not in HELD:
+        d.put(BEYOND_SQUARE, found["exponent"] - 2.0)
 
 
 def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
@@ -151,22 +157,15 @@ class PowerDrag(LoadDrag):
         t, speed = typical.load_torque_Nm, typical.speed_rad_per_s
         if not typical.relative:  # the bench's speeds span too little to tell a power
             return ()
-
-        def parameters(v: Values, rig: Rig | None) -> Values:
-            at_5 = v["torque_Nm"] * (SPEED_rad_per_s / speed) ** v["exponent"]
-            return {"torque_at_5_rad_per_s_Nm": at_5, "exponent": v["exponent"]}
-
-        def write(v: Values, d: TrialMachine, w: RunConditions) -> None:
-            own_numbers(parameters(v, None), d, w)
-
-        own_numbers = writes_numbers(cls, moving_load=True)
         unknowns = (
             Unknown(name="torque_Nm", unit="Nm", low=0.0, high=100.0 * t, scale=0.05 * t),
             Unknown(name="exponent", unit="-", low=1.2, high=4.5, scale=0.1),
+            Unknown(name="speed_rad_per_s", unit="rad/s", low=speed, high=speed, scale=0.0),
         )
         return (
-            Law(effect=cls.effect, law=cls.law, subsystem="load", kind=cls, write=write,
-                parameters=parameters, unknowns=unknowns, starts=((0.05 * t, 2.0), (0.3 * t, 2.0))),
+            Law(effect=cls.effect, law=cls.law, subsystem="load", kind=cls, write=_write_power,
+                parameters=_parameters, unknowns=unknowns,
+                starts=((0.05 * t, 2.0, speed), (0.3 * t, 2.0, speed))),
         )  # fmt: skip
 
     @classmethod

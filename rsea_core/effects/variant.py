@@ -143,6 +143,7 @@ FROM_ZERO = (
     "stiffness_Nm_per_rad",
     "damping_Nms_per_rad",
     "torque_at_5_rad_per_s_Nm",
+    "torque_Nm",
     "peak_Nm",
     "offset",
     "rate_per_s",

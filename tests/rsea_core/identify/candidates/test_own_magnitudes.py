@@ -1,9 +1,13 @@
 """Candidates for any machine hold no absolute number: all follow the machine's torque and time."""
 
+import numpy as np
 import pytest
 
+from rsea_core.effects.layout import N_EFFECTS
+from rsea_core.effects.variant import PLANT, RunConditions, TrialMachine
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
+from rsea_core.model.diagnosed_effects import read_laws
 from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig
 
 SMALL_AND_FAST = Units(torque=1e-6, time=1e-3)
@@ -63,3 +67,24 @@ def test_limits_and_starts_of_laws_scale_with_the_machine(cases):
                     a.name,
                     "start",
                 )
+
+
+def test_a_law_read_from_a_file_acts_as_on_the_case_that_it_was_found_on(cases):
+    """A file holds values alone: no magnitude of the case may be hidden in the law."""
+    for key, law in catalogue(cases[1], relative=True).items():
+        values = law.values(np.array(law.starts[0]))
+        entry = {"effect": law.effect, "law": law.law, "values": values}
+        if law.sensor is not None:
+            entry["column"] = law.sensor
+        ((again, read),) = read_laws([entry], "model.toml")
+        assert written(again, read) == written(law, values), key
+
+
+def written(law, values):
+    """Numbers that a law writes into a machine."""
+    machine = TrialMachine(plant=np.ones(len(PLANT)), fx=np.zeros(N_EFFECTS), stiffness=1.0)
+    law.write(values, machine, RunConditions(
+        index=0, file="", kind="contact", ratio=2.0, session_s=0.0, case_rise_K=0.0,
+        time_s=np.zeros(2),
+    ))  # fmt: skip
+    return machine.fx.tolist(), machine.plant.tolist()
