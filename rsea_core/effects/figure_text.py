@@ -18,7 +18,7 @@ READINGS = {
 }
 SCALED = ((1e-9, 1e-4, 1e6, "µ"), (1e-4, 0.1, 1e3, "m"))
 PREFIXED = ("Nm", "rad", "N", "m", "s", "A", "J")
-LINEAR = {"Nm": "N", "rad": "m", "Nm/rad": "N/m"}
+LINEAR = {"Nm": "N", "rad": "m", "Nm/rad": "N/m", "Nm/rad^3": "N/m^3"}
 
 
 def amount(value: float, unit: str, *, linear: bool = False) -> str:

@@ -144,7 +144,12 @@ from rsea_core.effects.spring_hysteresis import (  # noqa: F401
     SLIP_STIFFNESS,
     SLIP_YIELD,
 )
-from rsea_core.effects.spring_parallel import PARALLEL, PARALLEL_REST  # noqa: F401
+from rsea_core.effects.spring_parallel import (  # noqa: F401
+    PARALLEL,
+    PARALLEL_REST,
+    largest_parallel_stiffness,
+    parallel_energy_J,
+)
 from rsea_core.effects.spring_viscoelastic import (  # noqa: F401
     BRANCH_STIFFNESS,
     BRANCH_TIME,

@@ -29,6 +29,7 @@ from rsea_core.effects.spring_hardening import SpringHardening
 from rsea_core.effects.spring_contact import SpringContact
 from rsea_core.effects.spring_curve import SpringCurve
 from rsea_core.effects.spring_parallel import SpringParallel
+from rsea_core.effects.spring_parallel import StiffeningParallel as StiffeningParallel
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_friction_angle import LoadFrictionAngle as LoadFrictionAngle

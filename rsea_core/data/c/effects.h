@@ -144,8 +144,14 @@ static double rsea_drag_damping(double speed) {
 }
 /* Smooth torque on the load by its angle and speed. */
 static double rsea_load_torque(double angle, double speed) {
+    const double parallel = angle - E_parallel_rest_angle;
     double torque = -rsea_drag_damping(speed) * speed
-        - E_parallel_stiffness * (angle - E_parallel_rest_angle);
+        - E_parallel_stiffness * parallel;
+    if (E_parallel_cubic != 0.0) {
+        double cubic = parallel < E_parallel_up_to ? parallel : E_parallel_up_to;
+        if (cubic < -E_parallel_up_to) cubic = -E_parallel_up_to;
+        torque -= E_parallel_cubic * cubic * cubic * (3.0 * parallel - 2.0 * cubic);
+    }
     if (E_unbalance_torque != 0.0) torque -= E_unbalance_torque * sin(angle + E_unbalance_angle);
     if (E_position_step != 0.0) torque += rsea_position_torque(angle);
     if (E_formula_load_usual != 0.0)

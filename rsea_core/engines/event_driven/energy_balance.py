@@ -24,7 +24,7 @@ def one_less_cosine(angle: NDArray) -> NDArray:
 
 def stored_J(fx, wheel, load):
     """Energy that terms store [J] for arrays of wheel and load angle [rad]."""
-    stored = 0.5 * fx[e.PARALLEL] * (load - fx[e.PARALLEL_REST]) ** 2
+    stored = e.parallel_energy_J(fx, load)
     stored = stored + fx[e.GEAR_OFFSET] * wheel
     stored = stored + fx[e.UNBALANCE] * one_less_cosine(load + fx[e.UNBALANCE_ANGLE])
     for wave in e.COGGING_HARMONICS:

@@ -45,8 +45,9 @@ def rates_per_s(
         rates.append(2.0 * gear_ratio * wheel_speed)
     if fx[e.WORM_ERROR_3] != 0.0:
         rates.append(3.0 * gear_ratio * wheel_speed)
-    if fx[e.PARALLEL] > 0.0 and load_inertia > 0.0:
-        rates.append(np.sqrt(fx[e.PARALLEL] / load_inertia))
+    parallel = e.largest_parallel_stiffness(fx)
+    if parallel > 0.0 and load_inertia > 0.0:
+        rates.append(np.sqrt(parallel / load_inertia))
     if fx[e.UNBALANCE] > 0.0 and load_inertia > 0.0:
         rates.append(3.0 * np.sqrt(fx[e.UNBALANCE] / load_inertia))
     if fx[e.POSITION_STEP] != 0.0 and load_inertia > 0.0:

@@ -35,7 +35,8 @@ def longest_step_s(numbers, spring, fx):
         stiffness = 0.0
         moved = gear = output = gear + near
     stiff = stiffness / output if output > 0.0 else 0.0
-    on_load = stiffness + fx[e.PARALLEL] + fx[e.LINK_STIFFNESS] + e.position_stiffness(fx)
+    on_load = stiffness + e.largest_parallel_stiffness(fx) + fx[e.LINK_STIFFNESS]
+    on_load += e.position_stiffness(fx)
     if plant.contact_angle < np.inf:
         on_load += plant.contact_stiffness
         if fx[e.EXPONENT] > 0.0:

@@ -6,11 +6,16 @@ Each effect has its own sentence (`Term.sentence`); the contract's name stays be
 from collections.abc import Mapping
 
 from rsea_core.effects.figure_text import Figure, FigureText
-from rsea_core.effects.registry import TERMS
+from rsea_core.effects.registry import LAWS
 
 
 def effect_text(
-    effect: str, subsystem: str, figures: Mapping[str, Figure], *, linear: bool = False
+    effect: str,
+    subsystem: str,
+    figures: Mapping[str, Figure],
+    *,
+    law: str = "",
+    linear: bool = False,
 ) -> str | None:
     """What an effect is and how large; None where the figures do not say it.
 
@@ -20,13 +25,17 @@ def effect_text(
         As in the contract: "gear", "sensor:torque_Nm".
     figures : mapping
         Reported figures by their names, SI units and radians.
+    law : str
+        Its law, which may have a sentence of its own.
     linear : bool
         As in `figure_text.amount`.
     """
-    kind = TERMS.get(effect)
-    if kind is None:
-        return None
-    try:
-        return kind.sentence(FigureText(figures, subsystem.partition(":")[2], linear))
-    except KeyError:
-        return None
+    laws = LAWS.get(effect, {})
+    text = FigureText(figures, subsystem.partition(":")[2], linear)
+    for kind in (laws.get(law), *laws.values()):
+        if kind is not None:
+            try:
+                return kind.sentence(text)
+            except KeyError:
+                pass
+    return None

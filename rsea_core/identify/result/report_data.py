@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
-from rsea_core.effects.registry import TERMS
+from rsea_core.effects.registry import LAWS
 from rsea_core.errors import RseaError
 from rsea_core.identify.experiment.experiment_file import as_page
 from rsea_core.identify.experiment.next_experiment import NextExperiment
@@ -168,8 +168,10 @@ def _separability(moving: Sequence[Recording], smoothed: Sequence[Smoothed]) -> 
     )
 
 
-def _headline(effect: str) -> str:
-    return TERMS[effect].headline if effect in TERMS else ""
+def _headline(effect: str, law: str) -> str:
+    laws = LAWS.get(effect, {})
+    kind = laws.get(law, next(iter(laws.values()), None))
+    return kind.headline if kind is not None else ""
 
 
 def _effect(effect: Mapping) -> dict:
@@ -178,7 +180,7 @@ def _effect(effect: Mapping) -> dict:
         "subsystem": effect["subsystem"],
         "confidence": effect["confidence"],
         "law": effect["law"],
-        "words": _headline(effect["name"]),
+        "words": _headline(effect["name"], effect["law"]),
         "alike": tuple(name for name in effect["class"] if name != effect["name"]),
         "parameters": [
             {

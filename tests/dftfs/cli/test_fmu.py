@@ -61,7 +61,9 @@ LOAD = (
     r.LoadFrictionAngle(coulomb_Nm=0.1, share=0.4, phase_rad=0.2),
     r.PowerDrag(torque_at_5_rad_per_s_Nm=0.5, exponent=2.4),
     r.LoadUnbalance(torque_amplitude_Nm=0.5, angle_rad=0.3),
-    r.SpringParallel(stiffness_Nm_per_rad=2.0),
+    r.StiffeningParallel(
+        stiffness_Nm_per_rad=2.0, rest_angle_rad=0.1, cubic_Nm_per_rad3=30.0, up_to_rad=0.1
+    ),
     r.LoadPositionTorque(
         first_rad=-0.5, last_rad=0.5, node_Nm=tuple(0.3 * np.cos(2.0 * np.arange(32)))
     ),

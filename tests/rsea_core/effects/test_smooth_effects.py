@@ -34,6 +34,7 @@ from rsea_core.effects import (
     SpringParallel,
 )
 from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
+from rsea_core.effects.spring_parallel import StiffeningParallel
 from rsea_core.engines.event_driven.energy_balance import stored_J
 from rsea_core.errors import TermError
 
@@ -95,6 +96,12 @@ def within(depth, speed, law):
     return -law(depth, speed) if depth > 0.0 else 0.0
 
 
+def stiffening(d):
+    """40 d^3 up to 0.15 rad, its tangent there beyond."""
+    inside = np.clip(d, -0.15, 0.15)
+    return 40.0 * (inside**3 + 3.0 * 0.15**2 * (d - inside))
+
+
 A_COG, CYCLES = 0.03, 12.0
 PLACES_Nm = 0.5 * np.cos(1.7 * np.arange(32))
 PLACES = BSpline(  # a coefficient stands over its node; zeros so that it ends as it begins
@@ -127,6 +134,12 @@ CASES = {
     "spring-parallel": (
         SpringParallel(stiffness_Nm_per_rad=7.0, rest_angle_rad=0.1),
         {"on_load": lambda t, a, s: -7.0 * (a - 0.1)},
+    ),
+    "spring-parallel, cubic": (
+        StiffeningParallel(
+            stiffness_Nm_per_rad=3.0, rest_angle_rad=0.1, cubic_Nm_per_rad3=40.0, up_to_rad=0.15
+        ),
+        {"on_load": lambda t, a, s: -3.0 * (a - 0.1) - stiffening(a - 0.1)},
     ),
     "drive-dead-zone": (DriveDeadZone(width_duty=0.04), {"duty": DUTY - 0.04}),
     "drive-saturation": (DriveSaturation(source_resistance_ohm=1.5), {"source": 1.5}),

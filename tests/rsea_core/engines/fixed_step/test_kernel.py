@@ -36,6 +36,7 @@ from rsea_core.effects import (
     SpringHysteresis,
     SpringParallel,
     SpringViscoelastic,
+    StiffeningParallel,
     TorqueRipple,
 )
 from rsea_core.engines.fixed_step.replay import STATE_NAMES, Replay
@@ -92,6 +93,9 @@ TERMS = {
     "drive-delay": (DriveDelay(delay_s=2.3e-3),),
     "spring-hardening": (SpringHardening(stiffness_ratio_at_0p15rad=2.0),),
     "spring-parallel": (SpringParallel(stiffness_Nm_per_rad=2.0),),
+    "spring-parallel, cubic": (
+        StiffeningParallel(stiffness_Nm_per_rad=1.0, cubic_Nm_per_rad3=20.0, up_to_rad=0.3),
+    ),
     "load-friction": (LoadFriction(coulomb_Nm=0.08, stribeck_rise=0.4),),
     "load-drag": (LoadDrag(torque_at_5_rad_per_s_Nm=1.0),),
     "load-drag, power": (PowerDrag(torque_at_5_rad_per_s_Nm=1.0, exponent=1.6),),

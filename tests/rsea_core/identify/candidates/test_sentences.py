@@ -30,6 +30,14 @@ def test_sizes_are_printed_in_units_that_fit_them(value, unit, linear, expected)
     assert amount(value, unit, linear=linear) == expected
 
 
+def test_a_law_with_a_sentence_of_its_own_is_described_by_it():
+    figures = {"stiffness_Nm_per_rad": 2.0, "cubic_Nm_per_rad3": 30.0}
+    plain = effect_text("spring-parallel", "load", figures)
+    assert "stiffens" not in plain
+    cubic = effect_text("spring-parallel", "load", figures, law="cubic")
+    assert cubic == f"{plain} where it is unloaded, which stiffens (30 Nm/rad^3)"
+
+
 def test_every_law_of_the_catalogue_is_described_with_its_figures(tmp_path):
     case = planted(tmp_path).case
     described = set()
