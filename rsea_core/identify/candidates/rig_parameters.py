@@ -33,10 +33,11 @@ SERVO_FIELD = {
     "servo_dead_band_rad": "goal_dead_band",
 }
 DISTANCE = 0.01  # relative, of the load's centre from the joint: three millimetres in thirty cm
-BEHIND_GEAR = {
-    "motor_inertia_kgm2": "output_inertia_kgm2",
-    "motor_viscous_Nms_per_rad": "output_viscous_Nms_per_rad",
-}
+ONE_BODY = (  # before and behind the gear: only their sum is seen
+    ("motor_inertia_kgm2", "output_inertia_kgm2"),
+    ("motor_viscous_Nms_per_rad", "output_viscous_Nms_per_rad"),
+)
+PARTNER = {own: other for pair in ONE_BODY for own, other in (pair, pair[::-1])}
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
 UNKNOWN = 5.0  # times as much where the file leaves the damping out
 
@@ -80,9 +81,8 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
     commands = {r.command_name for r in case.identification}
     keys = _drive_keys(commands)
     if rig.has("gear"):
-        keys.append(_first_above_zero(rig, "motor_inertia_kgm2", "output_inertia_kgm2"))
-        damping = ("motor_viscous_Nms_per_rad", "output_viscous_Nms_per_rad")
-        keys.append(_first_above_zero(rig, *damping))
+        inertia, damping = ONE_BODY
+        keys += [_less_certain(rig, inertia), _less_certain(rig, damping)]
         one_body = not rig.has("spring") and rig.load_viscous_Nms_per_rad is not None
         if keys[-1] is None and not one_body:  # absent is unknown, not none
             keys.append(damping[0])
@@ -151,12 +151,24 @@ def _drive_keys(commands: set) -> list[str]:
     return keys + (list(SERVO_FIELD) if POSITION_COMMAND in commands else [])
 
 
-def _first_above_zero(rig: Rig, *keys: str) -> str | None:
-    return next((key for key in keys if getattr(rig, key)), keys[0] if _known(rig, keys) else None)
+def _less_certain(rig: Rig, keys: tuple[str, str]) -> str | None:
+    """Of the values before and behind the gear the one that may err by more, seen at the output.
+
+    The other is held. It alone could not take up their sum's error: neither falls below zero.
+    """
+    if all(getattr(rig, key) is None for key in keys):
+        return None
+    return max(keys, key=lambda key: _std(rig, key) * _at_output(rig, key))
 
 
-def _known(rig: Rig, keys: tuple[str, ...]) -> bool:
-    return any(getattr(rig, key) is not None for key in keys)
+def _std(rig: Rig, key: str) -> float:
+    """Standard deviation of a value by its tolerance, in its unit."""
+    return dict(rig.tolerances).get(key, TOLERANCES[key]) * (getattr(rig, key) or 0.0)
+
+
+def _at_output(rig: Rig, key: str) -> float:
+    """Inertia or damping at the output by one at its own side of the gear."""
+    return (rig.gear_ratio or 1.0) ** 2 if key.startswith("motor") else 1.0
 
 
 def _little(rig: Rig, key: str) -> float:
@@ -175,24 +187,25 @@ def _little(rig: Rig, key: str) -> float:
 def unstated_std(rig: Rig, key: str) -> float:
     """Standard deviation of a value from what is held fixed beside it and acts as one with it.
 
-    Inertia and damping of the wheel are one with the motor's, which take their errors; of mass
-    and distance of the load only the product is seen, and the mass takes it.
+    Inertia and damping of the wheel are one with the motor's: the less certain take the errors of
+    both; of mass and distance of the load only the product is seen, and the mass takes it.
     """
     if key == "load_mass_kg":
         if not rig.load_mass_kg or "load_distance_m" in rig.anchors:
             return 0.0
         return dict(rig.tolerances).get("load_distance_m", DISTANCE) * rig.load_mass_kg
-    if key not in BEHIND_GEAR:
+    if key not in PARTNER:
         return 0.0
-    other = BEHIND_GEAR[key]
-    return dict(rig.tolerances).get(other, TOLERANCES[other]) * held_jointly(rig, key)
+    other = PARTNER[key]
+    return _std(rig, other) * _at_output(rig, other) / _at_output(rig, key)
 
 
 def held_jointly(rig: Rig, key: str) -> float:
     """What is held fixed beside a value and acts as one with it, in its unit, on its side."""
-    if key not in BEHIND_GEAR:
+    if key not in PARTNER:
         return 0.0
-    return (getattr(rig, BEHIND_GEAR[key]) or 0.0) / (rig.gear_ratio or 1.0) ** 2
+    other = PARTNER[key]
+    return (getattr(rig, other) or 0.0) * _at_output(rig, other) / _at_output(rig, key)
 
 
 def write_nominal(

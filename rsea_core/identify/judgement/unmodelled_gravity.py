@@ -21,7 +21,8 @@ from rsea_core.model.actuator_model import GRAVITY_m_per_s2
 
 GRAVITY = ("load_mass_kg", "gravity_angle_offset_rad")
 # constants that grow with a torque reading's scale as the mass does, and not with the mass
-SCALED = ("torque_constant_Nm_per_A", "motor_inertia_kgm2", "spring_stiffness_Nm_per_rad")
+SCALED = ("torque_constant_Nm_per_A", "motor_inertia_kgm2", "output_inertia_kgm2",
+          "spring_stiffness_Nm_per_rad")  # fmt: skip
 
 
 def gravity_moved(problem: Problem, x: NDArray) -> NDArray:

@@ -129,9 +129,7 @@ def _named(conclusion: ReportedDiagnosis, j: int) -> str:
     law = conclusion.fit.hypothesis.laws[j]
     figures = conclusion.reported_figures(conclusion.fit.x, j)
     linear = conclusion.problem.case.rig.axis == "linear"
-    own_text = effect_text(
-        law.effect, law.subsystem, figures, law=law.law, linear=linear
-    )
+    own_text = effect_text(law.effect, law.subsystem, figures, law=law.law, linear=linear)
     if own_text is not None:
         return f"{own_text} ({law.effect})"
     values = (f"{n} {v:.4g}" if not isinstance(v, str) else f"{n} {v}" for n, v in figures.items())

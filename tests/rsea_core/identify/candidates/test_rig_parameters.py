@@ -1,0 +1,45 @@
+"""Which values of a rig file a fit may move."""
+
+from dataclasses import replace
+
+import pytest
+
+from rsea_core.identify.candidates.rig_parameters import held_jointly, nominals, unstated_std
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+RATIO = 5.0
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    return axis_case(tmp_path_factory.mktemp("axis"), axis_recording(seed=1), rig=axis_rig())
+
+
+def keys(case, **values):
+    rig = replace(axis_rig(), gear_ratio=RATIO, **values)
+    return {p.key for p in nominals(replace(case, rig=rig))}
+
+
+@pytest.mark.parametrize("quantity", ["inertia_kgm2", "viscous_Nms_per_rad"])
+def test_of_both_sides_of_a_gear_the_value_that_may_err_by_more_at_the_output_is_free(
+    case, quantity
+):
+    motor, output = f"motor_{quantity}", f"output_{quantity}"
+    sides = {motor: 1e-3, output: 0.02}  # 0.025 at the output
+    stated = ((motor, 0.1), (output, 0.1))
+    assert {motor} == keys(case, **sides, tolerances=stated) & {*sides}
+    stated = ((motor, 0.1), (output, 0.13))
+    assert {output} == keys(case, **sides, tolerances=stated) & {*sides}
+    assert {motor} == keys(case, **{motor: 1e-3, output: None}) & {*sides}
+    assert {output} == keys(case, **{motor: None, output: 0.02}) & {*sides}
+
+
+def test_what_is_held_beside_a_free_value_counts_on_that_values_side_of_the_gear():
+    rig = replace(
+        axis_rig(), gear_ratio=RATIO, motor_inertia_kgm2=1e-3, output_inertia_kgm2=0.02,
+        tolerances=(("motor_inertia_kgm2", 0.1), ("output_inertia_kgm2", 0.3)),
+    )  # fmt: skip
+    assert held_jointly(rig, "motor_inertia_kgm2") == pytest.approx(0.02 / RATIO**2)
+    assert held_jointly(rig, "output_inertia_kgm2") == pytest.approx(1e-3 * RATIO**2)
+    assert unstated_std(rig, "motor_inertia_kgm2") == pytest.approx(0.3 * 0.02 / RATIO**2)
+    assert unstated_std(rig, "output_inertia_kgm2") == pytest.approx(0.1 * 1e-3 * RATIO**2)
