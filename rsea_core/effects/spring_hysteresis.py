@@ -210,9 +210,10 @@ class SpringHysteresis(Hysteresis):
         """One to six elements."""
         K, d = typical.stiffness, typical.deflection_rad
         low, high = (2e-3 * d, 10.0 * d) if typical.relative else (2e-4, 1.0)
+        stiffest = (30.0 if typical.relative else 3.0) * K  # rubbing coils begin very stiff
         elements = [
             (
-                Unknown(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=3 * K,
+                Unknown(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=stiffest,
                         scale=0.03 * K),
                 Unknown(name=f"yield_{j}_rad", unit="rad", low=low, high=high, scale=0.15, log=True,
                         prior=1.0),
@@ -232,6 +233,10 @@ class SpringHysteresis(Hysteresis):
             found = tuple(v for share in shares for v in (stiffness / len(shares), share * d))
             return (*found, *at_begin)
 
+        def rubbing(shares: Sequence[float], torque: float) -> tuple[float, ...]:
+            found = (v for share in shares for v in (torque / (len(shares) * share * d), share * d))
+            return (*found, *at_begin)
+
         common = {"effect": cls.effect, "subsystem": "spring", "write": _write_slips, "kind": cls,
                   "parameters": _slip_parameters}  # fmt: skip
         return (
@@ -239,11 +244,12 @@ class SpringHysteresis(Hysteresis):
                 starts=(start((0.1,), 0.05 * K), start((0.5,), 0.1 * K), start((1.5,), 0.1 * K)),
                 richer=("two slips", "four slips", "six slips", "bouc-wen"), **common),
             Law(law="two slips", unknowns=(*flat[:4], *begun),
-                starts=(start((0.15, 0.8), 0.15 * K),),
+                starts=(start((0.15, 0.8), 0.15 * K), rubbing((0.06, 0.5), 0.3 * K * d)),
                 richer=("four slips", "six slips", "bouc-wen"), **common),
             Law(law="four slips", unknowns=(*flat[:8], *begun),
                 starts=(start((0.05, 0.2, 0.6, 1.6), 0.2 * K),
-                        start((0.1, 0.35, 0.8, 3.0), 0.1 * K)), **common),
+                        start((0.1, 0.35, 0.8, 3.0), 0.1 * K),
+                        rubbing((0.06, 0.2, 0.5, 1.0), 0.3 * K * d)), **common),
             Law(law="six slips", unknowns=spaced,
                 starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2, *at_begin),
                         (*(0.02 * K,) * 6, 0.05 * d, 2.0, *at_begin)), **common),

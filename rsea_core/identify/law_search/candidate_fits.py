@@ -1,4 +1,4 @@
-"""A candidate law fitted to its end: start, noise, dependence, richer forms, and its proof."""
+"""A candidate law fitted to its end: start, noise, dependence, and its proof."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,15 +6,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.effects.load_friction import LoadFriction
-from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import (
-    ALIKE_GAIN,
-    ALIKE_SHARE,
     ALONG,
     CLOSE_TO_RIG,
     EVEN,
@@ -25,11 +21,6 @@ from rsea_core.identify.multistep.criteria import (
     MOVES,
     NEAR,
     NEARLY_ABSENT,
-    NESTED_SHARE,
-    PER_VALUE,
-    PLAINER_SHARE,
-    RICHER_GAIN,
-    RICHER_RIVAL,
     SETTLED,
     SETTLING,
     STRAINED,
@@ -190,56 +181,6 @@ def absent(c: Candidate, own: Estimator, fit: Estimate) -> bool:
     return sum(float(np.sum((e[0] - e[1]) ** 2)) for e in found) < MOVES
 
 
-def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
-    """The law of the same effect that is worth its further values, if one is."""
-    c, own, fit = entry
-    tried: set[str] = set()
-    names = list(c.law.richer)
-    while names:
-        name = names.pop(0)
-        law = next((w for w in laws if w.law == name and w.effect == c.law.effect
-                    and w.sensor == c.law.sensor), None)  # fmt: skip
-        if law is None or name in tried:
-            continue
-        tried.add(name)
-        values = own.problem.values(fit.hypothesis, fit.x)[1][-1]
-        start = tuple(
-            values.get(p.name, first) for p, first in zip(law.unknowns, law.starts[0], strict=True)
-        )
-        more = fitted(own, base, replace(c, law=law, start=start, size=1.0))
-        better = fit.cost - more.cost - PER_VALUE * (count_values(law) - count_values(c.law))
-        say(f"    richer {law.key}: {better:.1f}")
-        if better > RICHER_GAIN and not at_bound(own.problem, more, law):
-            own = with_noise(own, more.hypothesis, more.x)
-            fit = own.fit(more.hypothesis, more.x, iterations=6)
-            c = replace(c, law=law)
-            names = [*names, *law.richer]
-    return c, own, fit
-
-
-def with_richer_rivals(
-    finished: list, base: Estimate, laws: Sequence[Law], worth, say
-) -> tuple[list, set[str]]:
-    """The entries, those near the best one with their effects' richer laws, and keys of these.
-
-    A plain law of the right effect may lose to a wrong effect that its richer law beats.
-    """
-    near = RICHER_RIVAL * max(worth(finished[0]), 0.0) if finished else 0.0
-    richest = set()
-    for place, entry in enumerate(finished):
-        if worth(entry) > near:
-            finished[place] = entry = with_richer_law(entry, base, laws, say)
-            richest.add(entry[0].law.key)
-    return preferred(finished, worth) if richest else finished, richest
-
-
-def preferred(finished: list, worth) -> list:
-    """The entries, best first: plainer laws before those that hold them, the load's readings."""
-    finished = prefer_plainer(sorted(finished, key=worth, reverse=True), worth)
-    prefer_load_reading(finished, worth)
-    return finished
-
-
 def too_fast(estimator: Estimator, fit: Estimate) -> bool:
     """Whether the last law's motion is faster than rows can show."""
     values = estimator.problem.values(fit.hypothesis, fit.x)[1][-1]
@@ -341,39 +282,6 @@ def restarted(finished: list, worth, say) -> list:
                 say(f"  {o.law.key}: gain {worth(entry):.1f} from the best one's values")
         found.append(entry)
     return sorted(found, key=worth, reverse=True)
-
-
-def prefer_plainer(finished: list, worth) -> list:
-    """Of laws at one place that gain about as much, only the one with fewer values.
-
-    A law that holds another one gains by whatever the other is not quite; that is no evidence,
-    and it is no rival of the other. The plainer form of the best law takes the best one's place.
-    """
-
-    def plainer_of(entry):
-        for other in finished:
-            fewer = count_values(other[0].law) < count_values(entry[0].law)
-            same = other[0].law.subsystem == entry[0].law.subsystem
-            nested = entry[0].law.effect == LoadFrictionAngle.effect
-            nested = nested and other[0].law.effect == LoadFriction.effect
-            share = NESTED_SHARE if nested else PLAINER_SHARE
-            if fewer and same and worth(other) > share * worth(entry):
-                return other
-        return None
-
-    first = plainer_of(finished[0]) or finished[0]
-    return [first] + [e for e in finished if e is not first and plainer_of(e) is None]
-
-
-def prefer_load_reading(finished: list, worth) -> None:
-    """Only the difference of two angles shows what one of them misreads: name the load's."""
-    first = finished[0]
-    for j, other in enumerate(finished[1:], 1):
-        alike = other[0].law.effect == first[0].law.effect and first[0].law.sensor is not None
-        near = worth(first) - worth(other) < ALIKE_GAIN + ALIKE_SHARE * worth(first)
-        if alike and near and other[0].law.sensor == "load_angle_rad":
-            finished[0], finished[j] = other, first
-            return
 
 
 def cost_of_mass(problem: MultistepProblem, entry) -> float:

@@ -28,21 +28,23 @@ from rsea_core.identify.law_search.candidate_fits import (
     fitted,
     from_prior,
     gain_of,
-    preferred,
     refitted_from_parent,
     restarted,
     settled,
     settled_by_output_error,
     too_fast,
     widened,
-    with_richer_law,
-    with_richer_rivals,
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
 from rsea_core.identify.law_search.gear_mesh import first_laws
 from rsea_core.identify.law_search.longer_windows import lengthened
 from rsea_core.identify.law_search.pruning import pruned, without_weak_end
 from rsea_core.identify.law_search.pulses import pulse_ratio
+from rsea_core.identify.law_search.richer_laws import (
+    preferred,
+    with_richer_law,
+    with_richer_rivals,
+)
 from rsea_core.identify.law_search.screening import Candidate, Projection
 from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.command_timing import CommandTiming

@@ -1,14 +1,12 @@
 """What is compared is comparable: laws at one share of independent innovations, mass by prior."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rsea_core.effects.load_disturbance import disturbance
 from rsea_core.effects.load_unbalance import unbalance
-from rsea_core.identify.law_search import candidate_fits
 from rsea_core.identify.law_search.candidate_fits import cost_of_mass, gain_of, values_at_bound
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -48,22 +46,3 @@ def test_a_value_at_a_bound_that_belongs_to_its_law_is_found_and_others_are_stop
     x = problem.start(h, [(1.0, 0.5, 5.0, 1.0)])  # fifty torques at its peak, flanks throughout
     fit = replace(estimate(0.0), hypothesis=h, x=x)
     assert values_at_bound(problem, fit, law) == ("peak_Nm",)
-
-
-def test_the_richer_law_of_a_rival_near_the_best_one_takes_its_place(monkeypatch):
-    near, far, best = (SimpleNamespace(law=SimpleNamespace(key=k)) for k in ("near", "far", "best"))
-    tried = []
-
-    def richer(entry, *_):
-        tried.append(entry[0].law.key)
-        return (*entry[:2], entry[2] + 100.0) if entry[0] is near else entry
-
-    monkeypatch.setattr(candidate_fits, "with_richer_law", richer)
-    monkeypatch.setattr(
-        candidate_fits, "preferred", lambda found, worth: sorted(found, key=worth)[::-1]
-    )
-    entries = [(best, None, 50.0), (near, None, 45.0), (far, None, 20.0)]
-    found, known = candidate_fits.with_richer_rivals(entries, None, (), lambda e: e[2], print)
-    assert [e[0].law.key for e in found] == ["near", "best", "far"]
-    assert tried == ["best", "near"]
-    assert known == {"best", "near"}
