@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.load_unbalance import LoadUnbalance
+from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Candidate
@@ -198,25 +199,37 @@ def confirmed(own: Estimator, base: Estimate, fit: Estimate) -> float:
     The deviation is that of the sum over stretches in which the law moves the predictions by
     equal shares: what one short event of a recording gains alone is no physics of the machine.
     No stretch counts more than `MOST_OF_ONE`, so that recordings of which some show a law far
-    better than others do not speak against it.
+    better than others do not speak against it. A constant of a reading is seen once in each
+    recording, which the filter takes for its zero (`start_variances`): recordings are its
+    stretches.
     """
     plain = own.fit(base.hypothesis, base.x, iterations=5)
     before, after = (
         own.innovations([(base.hypothesis, plain.x)]),
         own.innovations([(fit.hypothesis, fit.x)]),
     )
-    return even_ratio(own, before, after)
+    once_in_each = fit.hypothesis.laws[-1].kind is SensorOffset and len(own.tracks) > 1
+    return even_ratio(own, before, after, whole=once_in_each)
 
 
-def even_ratio(own: Estimator, before: Sequence[NDArray], after: Sequence[NDArray]) -> float:
-    """Fall of the cost from innovations to others, over its deviation between equal shares."""
+def even_ratio(
+    own: Estimator, before: Sequence[NDArray], after: Sequence[NDArray], *, whole: bool = False
+) -> float:
+    """Fall of the cost from innovations to others, over its deviation between equal shares.
+
+    Parameters
+    ----------
+    whole : bool
+        Each recording is one share.
+    """
     moved = [((e[0] - f[0]) ** 2).sum(axis=1) for e, f in zip(before, after, strict=True)]
     total = sum(float(m.sum()) for m in moved) or 1.0
     falls = []
     for t, m, e, f in zip(own.tracks, moved, before, after, strict=True):
         fall = 0.5 * own.tempering * (huber_squares(e[0]) - huber_squares(f[0])).sum(axis=1)
         least = EVENT * t.scale.time_s / (t.block * t.experiment.recording.sample_time_s)
-        falls.append(np.bincount(_equal_shares(m * STRETCHES / total, int(least) + 1), fall))
+        shares = _equal_shares(m * STRETCHES / total, m.size if whole else int(least) + 1)
+        falls.append(np.bincount(shares, fall))
     each = np.clip(np.concatenate(falls), -MOST_OF_ONE, MOST_OF_ONE)
     spread = max(float(np.std(each)), EVEN * abs(float(np.mean(each))), 1e-9)
     return float(each.sum()) / (spread * np.sqrt(each.size))

@@ -207,9 +207,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
             break
     else:
         return None
-    smooth(own, fit.hypothesis, fit.x)
-    found.estimator = own.having([prepared(t) for t in own.tracks])
-    found.best = found.estimator.fit(fit.hypothesis, fit.x, iterations=3)
+    found.estimator, found.best = _resmoothed(own, fit)
     return Step(
         law=c.law,
         screened=next((s.held_out for s in choice.screened if s.law.key == c.law.key), c.held_out),
@@ -222,6 +220,20 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
         near=tuple(e for e in finished if worth(e) > AGAIN * worth(entry)),
         contender=_contender(base, entry, finished),
     )
+
+
+def _resmoothed(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """A fit about the motion that it shows; the one given where that is less likely.
+
+    Noise that was estimated about another motion may not be what this one leaves.
+    """
+    other = own.having(own.tracks)
+    smooth(other, fit.hypothesis, fit.x)
+    other = other.having([prepared(t) for t in other.tracks])
+    again = other.fit(fit.hypothesis, fit.x, iterations=3)
+    if gain_of(other, fit, again) < -ARRIVED:
+        other, again = settled(other, again, once=True)
+    return likelier((own, fit), (other, again))
 
 
 def _contender(base: Estimate, entry: Entry, others: Sequence[Entry]) -> Law | None:
