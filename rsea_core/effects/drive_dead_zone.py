@@ -18,6 +18,8 @@ from rsea_core.effects.variant import Law, Unknown, writes_numbers
 DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "dead_time_current")
 GOAL_DEAD_BAND = slots("goal_dead_band")
 ROUNDED_ZONE, AFTER_ZONE = slots("rounded_dead_zone", "offset_after_dead_zone")
+THRESHOLD = slots("command_threshold")
+STEEP = 0.1  # of the threshold: commands about it over which a drive begins to act
 SERVO = "position_command_rad"
 
 
@@ -26,6 +28,9 @@ def beyond_dead_zone(fx, command):
     """What a drive with a dead zone makes of a command."""
     if fx[ROUNDED_ZONE] != 0.0:
         command -= fx[ROUNDED_ZONE] * np.tanh(command / fx[ROUNDED_ZONE])
+    if fx[THRESHOLD] != 0.0:
+        beyond = (abs(command) / fx[THRESHOLD] - 1.0) / STEEP
+        command *= 0.5 + 0.5 * np.tanh(beyond)
     if abs(command) <= fx[DEAD_ZONE]:
         return fx[AFTER_ZONE]
     less = command - fx[DEAD_ZONE] if command > 0.0 else command + fx[DEAD_ZONE]
@@ -140,7 +145,7 @@ class DriveDeadZone(Term):
         return (
             Law(effect=cls.effect, law=cls.name, subsystem="drive", kind=cls,
                 write=writes_numbers(cls), unknowns=(width,), starts=tuple((w,) for w in starts),
-                richer=(OffsetDeadZone.name,)),
+                richer=(OffsetDeadZone.name, ThresholdDeadZone.name)),
         )  # fmt: skip
 
     @classmethod
@@ -170,6 +175,40 @@ class RoundedDeadZone(DriveDeadZone):
 
     def equation(self) -> str:
         return f"acting duty = duty - {self.width_duty:g} tanh(duty / {self.width_duty:g})"
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThresholdDeadZone(DriveDeadZone):
+    """A drive that leaves out small commands and takes others whole, as servo amplifiers do.
+
+    acting command = u (1 + tanh((|u|/w - 1) / 0.1)) / 2: a step at w, of finite slope so that a
+    fit sees it.
+
+    Source
+    ------
+    Tao & Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996),
+    chapter 2, has the zone without a step; the step is that of a comparator.
+    """
+
+    law: ClassVar[str] = "threshold"
+    name: ClassVar[str] = "threshold"
+
+    def numbers(self, gear: Gear) -> Mapping[str, float]:
+        """The command below which nothing acts."""
+        return {"command_threshold": self.width_duty}
+
+    def equation(self) -> str:
+        return f"acting duty = duty where |duty| > {self.width_duty:g}, else 0 (over 10 % of it)"
+
+    @classmethod
+    def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
+        """As of the plain zone."""
+        if not typical.relative:
+            return ()
+        return tuple(
+            replace(law, law=cls.name, kind=cls, write=writes_numbers(cls), richer=())
+            for law in DriveDeadZone.candidates(typical)
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,6 +11,7 @@ from rsea_core.effects.drive_dead_zone import (
     DriveDeadZone,
     OffsetDeadZone,
     RoundedDeadZone,
+    ThresholdDeadZone,
 )
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.drive_thermal import DriveThermal
@@ -62,6 +63,7 @@ _FIRST: tuple[type[Term], ...] = (
     DriveDeadTime,
     OffsetDeadZone,
     RoundedDeadZone,
+    ThresholdDeadZone,
     DriveSaturation,
     DriveThermal,
     DriveDelay,

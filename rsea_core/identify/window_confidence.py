@@ -43,6 +43,8 @@ def step_presence(found: Found, number: int, unseen: HeldOut | None) -> float:
     unseen : HeldOut or None
         What all laws gain on rows held out; None where there are none.
     """
+    if found.complete:  # nothing but the sensors' noise is left of whole recordings
+        return UNCLAIMED if unseen is not None and unseen.gain <= 0.0 else 1.0
     step, ratio = found.steps[number], found.steps[number].ratio
     if number == 0 and unseen is not None:  # evidence of its own: the rows are others
         ratio = float(np.hypot(ratio, max(unseen.ratio, 0.0)))
@@ -72,7 +74,7 @@ def makes_predictable(found: Found) -> bool:
 
 def _among_rivals(step: Step, rig: Rig) -> float:
     """Probability of the step's effect, if it or a rival is there."""
-    scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
+    scale = RIVAL_SCALE + RIVAL_SHARE * step.gain if step.doubt is None else step.doubt
     own = step.law.effect  # in another reading it is the same effect elsewhere
     odds = [
         np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals

@@ -63,7 +63,7 @@ class WindowVerdict(Conclusion):
 
     def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
         found, self.held_out = _beyond_chance(found)
-        instead = gain_over_named(found, say)
+        instead = None if found.complete else gain_over_named(found, say)
         if instead is not None:
             found, self.held_out = found.parameters_alone(), None
         self.found, self.problem = found, found.problem
@@ -72,23 +72,27 @@ class WindowVerdict(Conclusion):
         self.search = FoundSearch(parameters=plain)
         self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
-        self.unknown, self.formula = unnamed_formula(found, self._unknown_shape(), say, instead)
+        self.unknown = self.formula = None
+        if not found.complete and (found.steps or not found.sound):
+            self.unknown, self.formula = unnamed_formula(found, self._unknown_shape(), say, instead)
         if self.formula is not None:
             self.fit = fit_of(self.formula.estimator, self.formula.fit)
             self.estimator = self.formula.estimator
         self.nominal, self.laws = self.problem.values(self.fit.hypothesis, self.fit.x)
         self.spread = spread_of(self.estimator, self.fit)
         self.question, self.residual, self.nearest = None, None, ()
-        self.uneven = found.refused if _gains_much(found.refused) and not found.steps else None
-        self.strained = None if found.steps else strained_value(self.problem, self.fit)
+        doubted = not found.steps and not found.sound
+        self.uneven = found.refused if _gains_much(found.refused) and doubted else None
+        self.strained = strained_value(self.problem, self.fit) if doubted else None
         h = self.fit.hypothesis
         self.error = relative_error(self.estimator, h, self.fit.x)
         self.unknown_torque = unknown_torque(self.estimator, self.error)
-        self.unpredicted = self.error > NO_PREDICTION
-        self.no_further = (error_left_beyond(found) or 0.0) > NOT_BEYOND
+        self.unpredicted = self.error > NO_PREDICTION and not found.sound
+        self.no_further = not found.complete and (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
+        self.dependent = self.dependent and not found.sound
         self.reason = _reason_of(self)
         self.verdict = self._verdict()
 
@@ -327,7 +331,9 @@ def _reason_of(judged: WindowVerdict) -> str | None:
 def _beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
     """What was found and what it gains on rows held out; without laws that lose there, if weak."""
     unseen = held_out(found) if found.steps else None
-    if unseen is None or unseen.gain >= WORSE or found.steps[0].gain > UNEVEN_GAIN:
+    if unseen is None or unseen.gain >= WORSE:
+        return found, unseen
+    if found.steps[0].gain > UNEVEN_GAIN and not found.sound:
         return found, unseen
     return found.parameters_alone(), None
 

@@ -6,8 +6,11 @@ static double rsea_acting(double command) {
     command += E_command_offset;
     if (E_rounded_dead_zone != 0.0)
         command -= E_rounded_dead_zone * tanh(command / E_rounded_dead_zone);
+    if (E_command_threshold != 0.0)
+        command *= 0.5 + 0.5 * tanh((fabs(command) / E_command_threshold - 1.0) / 0.1);
     if (fabs(command) <= E_dead_zone) command = 0.0;
     else command -= command > 0.0 ? E_dead_zone : -E_dead_zone;
+    command += E_offset_after_dead_zone;
     return command + (E_command_gain_by_sign + E_command_gain_by_size * command) * fabs(command)
         + E_command_gain_by_square * command * command * command;
 }

@@ -7,6 +7,7 @@ import numpy as np
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
+from rsea_core.identify.multistep.criteria import INCOMPLETE
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 
@@ -34,6 +35,8 @@ class Step:
         Those that are ranked again where windows become longer.
     contender : Law or None
         Of another effect, with far more gain if the innovations of each count what they are worth.
+    doubt : float or None
+        Units of gain by which a rival is e times less probable; None: by the gain.
     """
 
     law: Law
@@ -44,6 +47,7 @@ class Step:
     rivals: tuple[tuple[Law, float], ...]
     near: tuple[Entry, ...] = ()
     contender: Law | None = None
+    doubt: float | None = None
 
 
 @dataclass
@@ -62,6 +66,11 @@ class Found:
         A law taken and taken out again, for it gained in too few stretches of rows.
     shared : tuple of str
         Recordings held out of which a part was fitted (`hold_out.with_moving_loads`).
+    left_by_parameters : float
+        What parameters alone leave of whole recordings, in deviations of the sensors' noise
+        (`whole_runs`); inf: not known.
+    complete : bool
+        Whether the laws leave nothing of whole recordings but that noise.
     """
 
     problem: MultistepProblem
@@ -77,6 +86,13 @@ class Found:
     base_shapes: list[Shape] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
     screened: list[Candidate] = field(default_factory=list)
+    left_by_parameters: float = np.inf
+    complete: bool = False
+
+    @property
+    def sound(self) -> bool:
+        """Whether parameters alone predict whole recordings to the sensors' noise."""
+        return self.left_by_parameters < INCOMPLETE
 
     @property
     def predicts_longer(self) -> bool:

@@ -29,7 +29,8 @@ WALL = Load(kind="contact", contact_stiffness_Nm_per_rad=200.0, contact_angle_ra
             contact_damping_Nms_per_rad=0.5)  # fmt: skip
 
 DRIVE = (
-    r.DriveDeadZone(width_duty=0.03),
+    r.OffsetDeadZone(width_duty=0.03, offset_after=0.01),
+    r.ThresholdDeadZone(width_duty=0.02),
     r.DriveOffset(offset=0.01),
     r.DriveNonlinearGain(by_sign=0.05, by_size=-0.1, by_square=0.2),
     r.DriveSaturation(source_resistance_ohm=1.0, returned_share=0.0, ripple_share=0.5),

@@ -32,6 +32,7 @@ from rsea_core.effects import (
     SpringCurve,
     SpringHardening,
     SpringParallel,
+    ThresholdDeadZone,
 )
 from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.spring_parallel import StiffeningParallel
@@ -223,6 +224,20 @@ def test_an_offset_after_a_dead_zone_acts_where_the_zone_leaves_nothing():
         for terms, duty in (((zone,), asked), ((), acting))
     )
     np.testing.assert_allclose(found.load_angle_rad, plain.load_angle_rad, rtol=0.0, atol=1e-12)
+
+
+def test_a_threshold_leaves_out_small_commands_and_takes_large_ones_whole():
+    drive = ThresholdDeadZone(width_duty=0.1)
+    for asked, acting in ((0.07, 0.0), (0.14, 0.14)):
+        sign = np.sign(np.sin(40.0 * TIME))
+        found, plain = (
+            simulate(ActuatorModel(BENCH, terms), Inputs(time_s=TIME, duty=duty))
+            for terms, duty in (((drive,), asked * sign), ((), acting * sign))
+        )
+        np.testing.assert_allclose(
+            found.load_angle_rad, plain.load_angle_rad, rtol=0.0,
+            atol=5e-3 * max(np.ptp(plain.load_angle_rad), np.ptp(found.load_angle_rad)) + 1e-4,
+        )  # fmt: skip
 
 
 @pytest.mark.parametrize("width", [0.01, 0.05, 0.3])

@@ -37,6 +37,7 @@ from rsea_core.effects import (
     SpringParallel,
     SpringViscoelastic,
     StiffeningParallel,
+    ThresholdDeadZone,
     TorqueRipple,
 )
 from rsea_core.engines.fixed_step.replay import STATE_NAMES, Replay
@@ -82,6 +83,7 @@ TERMS = {
     ),
     "motor-cogging": (MotorCogging(amplitude_Nm=0.01, cycles_per_rev=12.0),),
     "drive-dead-zone": (DriveDeadZone(width_duty=0.03),),
+    "drive-dead-zone, threshold": (ThresholdDeadZone(width_duty=0.05),),
     "drive-dead-zone, rounded": (RoundedDeadZone(width_duty=0.03),),
     "drive-dead-zone, offset": (OffsetDeadZone(width_duty=0.03, offset_after=0.02),),
     "drive-dead-zone, dead time": (DriveDeadTime(width_duty=0.03, crossover_A=0.1),),

@@ -1,0 +1,197 @@
+"""Laws with which whole recordings are predicted to the sensors' noise (docs/diagnosis.md 10.5).
+
+Where parameters alone leave more than that, laws are added one by one, each the one that lowers
+the error most, until nothing is left; then those are taken out that the others make needless. A
+set of laws that leaves nothing but noise stands, in place of what windows showed; one that leaves
+more proves nothing.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rsea_core.effects.variant import Law
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
+from rsea_core.identify.law_search.found import Found, Step
+from rsea_core.identify.law_search.screening import Candidate, screen
+from rsea_core.identify.law_search.search import laws_of
+from rsea_core.identify.multistep.criteria import (
+    COMPLETE,
+    COMPLETE_SHARE,
+    DOUBT,
+    INCOMPLETE,
+    LEAST_OF_LEFT,
+    PER_VALUE,
+    RIVAL_SCALE,
+    RIVAL_SHARE,
+    WHOLE_FORMS,
+    WHOLE_LAWS,
+    WHOLE_TRIED,
+)
+from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
+from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit
+
+SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trial:
+    """One law beside others, fitted to whole recordings.
+
+    Attributes
+    ----------
+    gain : float
+        Fall of the cost, less the price of the law's values.
+    left : float
+        Misfit [noise deviations].
+    """
+
+    law: Law
+    fit: Estimate
+    gain: float
+    left: float
+
+
+@dataclass
+class _Search:
+    """Laws taken so far, and what each was compared with."""
+
+    own: Estimator
+    plain: Estimate
+    laws: Sequence[Law]
+    enough: float  # misfit that is as good as none
+
+    def __post_init__(self) -> None:
+        self.fit, self.taken = self.plain, []
+        self.rivals: dict[str, list[Trial]] = {}
+
+    def doubt(self) -> float:
+        """Units by which a law may lose against a rival by what nothing explains."""
+        return RIVAL_SCALE + DOUBT * excess(self.own, self.fit.hypothesis, self.fit.x)
+
+    def left(self) -> float:
+        """Misfit with the laws taken."""
+        return misfit(self.own, self.fit.hypothesis, self.fit.x)
+
+    def add(self, say) -> bool:
+        """Take the law that lowers the error most; whether there is one."""
+        trials = self.trials()
+        if not trials or trials[0].gain < LEAST_OF_LEFT * self.plain_excess():
+            return False
+        best = _plainest(trials)
+        others = [t for t in trials if t is not best]
+        say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
+        self.fit = best.fit
+        self.taken.append(best.law)
+        self.rivals[best.law.key] = others
+        return True
+
+    def plain_excess(self) -> float:
+        """What parameters alone leave above the noise, in units."""
+        return max(self.plain.cost - self.fit.cost, 0.0) + 1.0
+
+    def trials(self) -> list[Trial]:
+        """Candidates fitted beside what was taken, best first."""
+        have = {(law.effect, law.sensor) for law in self.taken}
+        left = [w for w in self.laws if (w.effect, w.sensor) not in have]
+        found = []
+        for c in _most_promising(screen(self.own, self.fit, left)):
+            fit = fitted(self.own, self.fit, c, factors=SIZES)
+            gain = self.fit.cost - fit.cost - PER_VALUE * count_values(c.law)
+            if np.isfinite(gain) and not at_bound(self.own.problem, fit, c.law):
+                left_by = misfit(self.own, fit.hypothesis, fit.x)
+                found.append(Trial(law=c.law, fit=fit, gain=gain, left=left_by))
+        return sorted(found, key=lambda t: -t.gain)
+
+    def prune(self, say) -> None:
+        """Take out laws without which the rest leaves as little."""
+        for law in tuple(self.taken[:-1]):
+            less = self.without(law)
+            if misfit(self.own, less.hypothesis, less.x) < self.enough:
+                say(f"  whole recordings: {law.key} is needless")
+                self.fit = less
+                self.taken.remove(law)
+
+    def without(self, law: Law) -> Estimate:
+        """The fit with one law less."""
+        kept, keep = [], [True] * len(self.own.problem.nominals)
+        for other in self.fit.hypothesis.laws:
+            kept += [] if other is law else [other]
+            keep += [other is not law] * count_values(other)
+        return self.own.fit(Hypothesis(laws=tuple(kept)), self.fit.x[np.array(keep)], iterations=12)
+
+
+def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
+    """The best of each effect and reading, in no more than some forms."""
+    found, forms = [], {}
+    for c in sorted(screened, key=lambda c: -c.gain):
+        place = (c.law.effect, c.law.sensor)
+        forms[place] = forms.get(place, 0) + 1
+        if forms[place] <= WHOLE_FORMS:
+            found.append(c)
+    return found[:WHOLE_TRIED]
+
+
+def _plainest(trials: Sequence[Trial]) -> Trial:
+    """Of an effect's laws that gain about as much as the best, the one with the fewest values."""
+    first = trials[0]
+    alike = [
+        t for t in trials
+        if t.law.effect == first.law.effect and t.law.sensor == first.law.sensor
+        and t.gain > (1.0 - RIVAL_SHARE) * first.gain
+    ]  # fmt: skip
+    return min(alike, key=lambda t: count_values(t.law))
+
+
+def with_whole_runs(found: Found, say) -> Found:
+    """What was found, or the laws that leave nothing but the sensors' noise of whole recordings."""
+    own = in_sensor_noise(found.base_estimator)
+    plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
+    left = misfit(own, plain.hypothesis, plain.x)
+    say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
+    found = replace(found, left_by_parameters=left)
+    if not INCOMPLETE < left < np.inf:
+        return found
+    search = _Search(own, plain, laws_of(found), max(COMPLETE, COMPLETE_SHARE * left))
+    while search.left() > search.enough and len(search.taken) < WHOLE_LAWS and search.add(say):
+        pass
+    if search.left() > search.enough:
+        return found
+    search.prune(say)
+    return _as_before(found, search, say) or _complete(found, search)
+
+
+def _as_before(found: Found, search: _Search, say) -> Found | None:
+    """What windows showed, where it leaves as little; None where the search's laws leave less."""
+    if not found.steps:
+        return None
+    h = found.best.hypothesis
+    fit = search.own.fit(h, found.best.x, iterations=12)
+    left = misfit(search.own, h, fit.x)
+    say(f"whole recordings: what windows showed leaves {left:.2f}")
+    if left > search.enough or fit.cost > search.fit.cost + search.doubt():
+        return None
+    return replace(found, complete=True)
+
+
+def _complete(found: Found, search: _Search) -> Found:
+    """The search's laws as what was found."""
+    own, fit = search.own.having(search.own.tracks), search.fit
+    own.tempering = independent_share(own, fit.hypothesis, fit.x)
+    fit = own.fit(fit.hypothesis, fit.x, iterations=4)
+    steps = []
+    for law in search.taken:
+        without = search.plain if len(search.taken) == 1 else search.without(law)
+        gain = without.cost - search.fit.cost - PER_VALUE * count_values(law)
+        # rivals of an earlier law were fitted beside fewer laws
+        rivals = search.rivals[law.key] if law is search.taken[-1] else ()
+        steps.append(
+            Step(law=law, screened=gain, gain=gain, ratio=np.inf, tempering=own.tempering,
+                 rivals=tuple((t.law, t.gain) for t in rivals), doubt=search.doubt())
+        )  # fmt: skip
+    return replace(
+        found, estimator=own, best=fit, steps=steps, horizon=None, base_shapes=[], shapes=[],
+        refused=None, complete=True,
+    )  # fmt: skip

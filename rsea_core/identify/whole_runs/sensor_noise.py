@@ -1,0 +1,55 @@
+"""Fits of whole recordings whose errors the sensors' noise alone may fill.
+
+The filter of the multistep search takes what a model lacks for an unknown torque, which the noise
+of each hypothesis is free to hold: a slow torque takes the place of a parallel spring. Here the
+readings keep the noise that their fastest changes show, and unknown torques are as good as none.
+A model that is complete leaves one deviation of that noise; what leaves many lacks something.
+Output-error identification with known noise: Ljung, System Identification (1999), section 3.3;
+the test of the misfit: Pearson's, as in section 16.6 there.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.criteria import SENSORS_ALONE
+from rsea_core.identify.multistep.estimator import Estimator
+from rsea_core.identify.multistep.horizons import with_windows
+from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.identify.multistep.tracks import prepared
+
+
+def in_sensor_noise(estimator: Estimator) -> Estimator:
+    """Another estimator, of whole recordings, with the readings' noise and hardly any torques'."""
+    tracks = []
+    for t in with_windows(estimator, None):
+        noise, readings = t.noise, t.noise.readings
+        if noise.colours.size:
+            readings = np.hypot(readings, noise.colours)
+        inputs, colours = SENSORS_ALONE * noise.inputs, 0.0 * noise.colours
+        noise = replace(noise, inputs=inputs, readings=readings, colours=colours)
+        tracks.append(prepared(t, noise=noise))
+    own = estimator.having(tracks)
+    own.tempering = 1.0
+    return own
+
+
+def misfit(own: Estimator, h: Hypothesis, x: NDArray) -> float:
+    """Largest root mean square error of a reading, in deviations of its noise; inf: no prediction.
+
+    Errors beyond Huber's bound count linearly, so that a few rows that read nonsense do not decide.
+    """
+    worst = 0.0
+    for e in own.innovations([(h, x)]):
+        if not np.all(np.isfinite(e[0])):
+            return np.inf
+        worst = max(worst, float(np.sqrt(np.max(np.mean(huber_squares(e[0]), axis=0)))))
+    return worst
+
+
+def excess(own: Estimator, h: Hypothesis, x: NDArray) -> float:
+    """Cost of the errors beyond that of the noise, in units; 0 where noise alone costs as much."""
+    found = own.innovations([(h, x)])
+    return max(sum(0.5 * float(np.sum(huber_squares(e) - 1.0)) for e in found), 0.0)
