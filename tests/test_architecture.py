@@ -133,6 +133,7 @@ CORE_LAYERS = (
     ("identify.result", "identify.spring_bench", "scenarios", "interop"),
     ("identify.steady_map", "identify.multistep"),
     ("identify.law_search",),
+    ("identify.whole_runs",),
     ("identify.formula",),
     ("identify", "engines"),
 )

@@ -7,7 +7,7 @@ import numpy as np
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.identify.clamped_loads import with_yielding_clamps
-from rsea_core.identify.law_search.investigate import investigate
+from rsea_core.identify.investigate import investigate
 from rsea_core.identify.multistep.command_timing import RowTimes
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, MESH_DAMPER, RATIO
@@ -15,7 +15,6 @@ from rsea_core.identify.result.corrected_model import FoundModel, heat_left, res
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
-from rsea_core.identify.whole_runs.search import with_whole_runs
 from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
@@ -38,10 +37,7 @@ def diagnose_windows(
     """
     case, filled = with_servo_gains(case)
     case, clamps = with_yielding_clamps(case)
-    found = investigate(case, quick=quick, say=say)
-    if not quick:
-        found = with_whole_runs(found, say)
-    conclusion = WindowVerdict(found, case, say)
+    conclusion = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
     findings = [Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps]
     findings += findings_of(conclusion) + servo_findings(conclusion, filled)
     laws = _model_laws(conclusion)

@@ -13,6 +13,7 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import (
     ALONG,
+    ARRIVED,
     CLOSE_TO_RIG,
     EVEN,
     EVENT,
@@ -35,9 +36,15 @@ from rsea_core.identify.multistep.estimator import (
     independent_share,
 )
 from rsea_core.identify.multistep.experiment import STATED_BOUND, MultistepProblem
-from rsea_core.identify.multistep.horizons import likelier, with_noise, with_output_error
+from rsea_core.identify.multistep.horizons import (
+    likelier,
+    smooth,
+    with_noise,
+    with_output_error,
+)
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS
+from rsea_core.identify.multistep.tracks import prepared
 
 
 def fitted(
@@ -108,6 +115,20 @@ def _settled(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
             break
     own.tempering = independent_share(own, fit.hypothesis, fit.x)
     return own, own.fit(fit.hypothesis, fit.x, iterations=4)
+
+
+def resmoothed_fit(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """A fit about the motion that it shows; the one given where that is less likely.
+
+    Noise that was estimated about another motion may not be what this one leaves.
+    """
+    other = own.having(own.tracks)
+    smooth(other, fit.hypothesis, fit.x)
+    other = other.having([prepared(t) for t in other.tracks])
+    again = other.fit(fit.hypothesis, fit.x, iterations=3)
+    if gain_of(other, fit, again) < -ARRIVED:
+        other, again = settled(other, again, once=True)
+    return likelier((own, fit), (other, again))
 
 
 def gain_of(own: Estimator, base: Estimate, fit: Estimate, share: float | None = None) -> float:

@@ -29,6 +29,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     from_prior,
     gain_of,
     refitted_from_parent,
+    resmoothed_fit,
     restarted,
     settled,
     settled_by_output_error,
@@ -77,11 +78,9 @@ from rsea_core.identify.multistep.experiment import Experiment
 from rsea_core.identify.multistep.horizons import (
     likelier,
     parameters_with_timing,
-    smooth,
     with_fine_steps,
 )
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER, nuisances
-from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case
 
@@ -90,11 +89,11 @@ ANGLES = ("motor_angle_rad", "load_angle_rad")
 HOLDS_NO_CLAIM = (DriveDelay.effect, SensorNoise.effect)  # nuisances, or no physics
 
 
-def searched(
+def begun(
     case: Case, timing: CommandTiming | None, say, *, quick: bool = False,
     mesh: tuple[Law, ...] = (),
 ) -> Found:  # fmt: skip
-    """The search under one timing of the command; None: that which parameters alone prefer.
+    """Parameters alone, under one timing of the command; None: that which they prefer.
 
     Parameters
     ----------
@@ -111,6 +110,15 @@ def searched(
     problem = estimator.problem
     found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
                   best=base, horizon=horizon, base_horizon=horizon)  # fmt: skip
+    return found
+
+
+def searched(
+    case: Case, timing: CommandTiming | None, say, *, quick: bool = False,
+    mesh: tuple[Law, ...] = (),
+) -> Found:  # fmt: skip
+    """The search in windows, from parameters alone (`begun`) on."""
+    found = begun(case, timing, say, quick=quick, mesh=mesh)
     laws = laws_of(found)
     add_all(found, first_laws(laws) if mesh else laws, say, quick=quick, further=not mesh)
     return found
@@ -207,7 +215,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
             break
     else:
         return None
-    found.estimator, found.best = _resmoothed(own, fit)
+    found.estimator, found.best = resmoothed_fit(own, fit)
     return Step(
         law=c.law,
         screened=next((s.held_out for s in choice.screened if s.law.key == c.law.key), c.held_out),
@@ -220,20 +228,6 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
         near=tuple(e for e in finished if worth(e) > AGAIN * worth(entry)),
         contender=_contender(base, entry, finished),
     )
-
-
-def _resmoothed(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
-    """A fit about the motion that it shows; the one given where that is less likely.
-
-    Noise that was estimated about another motion may not be what this one leaves.
-    """
-    other = own.having(own.tracks)
-    smooth(other, fit.hypothesis, fit.x)
-    other = other.having([prepared(t) for t in other.tracks])
-    again = other.fit(fit.hypothesis, fit.x, iterations=3)
-    if gain_of(other, fit, again) < -ARRIVED:
-        other, again = settled(other, again, once=True)
-    return likelier((own, fit), (other, again))
 
 
 def _contender(base: Estimate, entry: Entry, others: Sequence[Entry]) -> Law | None:

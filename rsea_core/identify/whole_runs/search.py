@@ -1,9 +1,9 @@
-"""Laws with which whole recordings are predicted to the sensors' noise (docs/diagnosis.md 10.5).
+"""Laws with which whole recordings are predicted to the sensors' noise (docs/diagnosis.md 10.4).
 
 Where parameters alone leave more than that, laws are added one by one, each the one that lowers
 the error most, until nothing is left; then those are taken out that the others make needless. A
-set of laws that leaves nothing but noise stands, in place of what windows showed; one that leaves
-more proves nothing.
+set of laws that leaves nothing but noise stands, and no windows are searched; one that leaves more
+proves nothing.
 """
 
 from collections.abc import Sequence
@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
 from rsea_core.identify.law_search.found import Found, Step
-from rsea_core.identify.law_search.screening import Candidate, screen
+from rsea_core.identify.law_search.pulses import pulses
+from rsea_core.identify.law_search.screening import Candidate, Projection, screen
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.criteria import (
     COMPLETE,
@@ -24,6 +26,7 @@ from rsea_core.identify.multistep.criteria import (
     INCOMPLETE,
     LEAST_OF_LEFT,
     PER_VALUE,
+    PULSES,
     RIVAL_SCALE,
     RIVAL_SHARE,
     WHOLE_FORMS,
@@ -97,7 +100,10 @@ class _Search:
         have = {(law.effect, law.sensor) for law in self.taken}
         left = [w for w in self.laws if (w.effect, w.sensor) not in have]
         found = []
-        for c in _most_promising(screen(self.own, self.fit, left)):
+        screened = screen(self.own, self.fit, left)
+        if (LoadDisturbance.effect, None) not in have:
+            screened += pulses(Projection(self.own, self.fit))[:PULSES]
+        for c in _most_promising(screened):
             fit = fitted(self.own, self.fit, c, factors=SIZES)
             gain = self.fit.cost - fit.cost - PER_VALUE * count_values(c.law)
             if np.isfinite(gain) and not at_bound(self.own.problem, fit, c.law):
@@ -154,26 +160,29 @@ def with_whole_runs(found: Found, say) -> Found:
     found = replace(found, left_by_parameters=left)
     if not INCOMPLETE < left < np.inf:
         return found
-    search = _Search(own, plain, laws_of(found), max(COMPLETE, COMPLETE_SHARE * left))
+    search = _Search(own, plain, laws_of(found), _enough(left))
     while search.left() > search.enough and len(search.taken) < WHOLE_LAWS and search.add(say):
         pass
     if search.left() > search.enough:
         return found
     search.prune(say)
-    return _as_before(found, search, say) or _complete(found, search)
+    return _complete(found, search)
 
 
-def _as_before(found: Found, search: _Search, say) -> Found | None:
-    """What windows showed, where it leaves as little; None where the search's laws leave less."""
-    if not found.steps:
-        return None
-    h = found.best.hypothesis
-    fit = search.own.fit(h, found.best.x, iterations=12)
-    left = misfit(search.own, h, fit.x)
+def confirmed_by_whole_runs(found: Found, say) -> Found:
+    """What windows showed, marked as complete if it leaves as little of whole recordings."""
+    if not found.steps or not INCOMPLETE < found.left_by_parameters < np.inf:
+        return found
+    own, h = in_sensor_noise(found.base_estimator), found.best.hypothesis
+    fit = own.fit(h, found.best.x, iterations=12)
+    left = misfit(own, h, fit.x)
     say(f"whole recordings: what windows showed leaves {left:.2f}")
-    if left > search.enough or fit.cost > search.fit.cost + search.doubt():
-        return None
-    return replace(found, complete=True)
+    return replace(found, complete=left <= _enough(found.left_by_parameters))
+
+
+def _enough(left: float) -> float:
+    """Misfit that is as good as none, by what parameters alone leave."""
+    return max(COMPLETE, COMPLETE_SHARE * left)
 
 
 def _complete(found: Found, search: _Search) -> Found:

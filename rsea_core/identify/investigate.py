@@ -1,4 +1,6 @@
-"""What a case's recordings show: one search, and others where its end is in doubt.
+"""What a case's recordings show: whole recordings first, windows where these do not suffice.
+
+In windows one search follows, and others where its end is in doubt.
 
 Each further search begins elsewhere: with a law whose innovations are more independent, at other
 times of the commands, or with the gear's mesh in place of a rigid train. The one whose model
@@ -6,15 +8,17 @@ predicts for longest stands, of equals the likeliest (docs/diagnosis.md 10.4).
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
 from rsea_core.identify.law_search.hold_out import with_moving_loads
-from rsea_core.identify.law_search.search import add_all, laws_of, searched
+from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
 from rsea_core.identify.multistep.criteria import DOUBTED_ERROR, DOUBTED_SHARE, TIMING_SHARE
 from rsea_core.identify.multistep.horizons import likelier, relative_error, with_better_timing
+from rsea_core.identify.whole_runs.search import confirmed_by_whole_runs, with_whole_runs
 from rsea_core.recordings.case import Case
 
 
@@ -31,7 +35,21 @@ def investigate(
     case, shared = with_moving_loads(case)
     for file in shared:
         say(f"{file}: two thirds are fitted: no other recording lets the load move")
-    found = searched(case, None, say, quick=quick)
+    found = begun(case, None, say, quick=quick)
+    if not quick:
+        found = with_whole_runs(found, say)
+    if not found.complete:
+        add_all(found, laws_of(found), say, quick=quick)
+        found = _in_doubt(case, found, say, quick=quick)
+        if not quick:
+            found = confirmed_by_whole_runs(found, say)
+    found.shared = shared
+    return found
+
+
+def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:
+    """The best of further searches, where the end of the first is in doubt."""
+    left = found.left_by_parameters
     if found.steps and not quick:
         found = _better_search(found, _begun_by_contender(found, say))
         # a missing law can pass for another timing of the command
@@ -43,8 +61,7 @@ def investigate(
             found = _better_search(found, _begun_by_contender(again, say), again)
     if not quick and encoders_disagree(found):
         found = _better_search(found, _through_gear_mesh(case, found, say))
-    found.shared = shared
-    return found
+    return replace(found, left_by_parameters=left)
 
 
 def _through_gear_mesh(case: Case, found: Found, say) -> Found:

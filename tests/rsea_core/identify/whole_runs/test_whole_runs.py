@@ -1,0 +1,76 @@
+"""Whole recordings in the sensors' noise tell a complete hypothesis from one that lacks a law."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_core.effects.spring_parallel import SpringParallel
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.candidate_fits import settled
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.multistep.criteria import COMPLETE, INCOMPLETE
+from rsea_core.identify.multistep.horizons import parameters_with_timing, with_fine_steps
+from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.whole_runs.search import confirmed_by_whole_runs, with_whole_runs
+from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+
+def parameters_alone(folder, *terms, off=1.0):
+    """Parameters fitted to two recordings of an axis, as a search begins."""
+    recordings = (axis_recording(*terms, seed=seed) for seed in (1, 2))
+    case = axis_case(folder, *recordings, rig=axis_rig(off=off))
+    h = Hypothesis(laws=nuisances(case))
+    estimator, base, horizon = parameters_with_timing(case, h, lambda text: None)
+    estimator, base = with_fine_steps(estimator, base, lambda text: None, per_cycle=50)
+    estimator, base = settled(estimator, base)
+    return Found(problem=estimator.problem, base_estimator=estimator, base=base,
+                 estimator=estimator, best=base, horizon=horizon, base_horizon=horizon)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory):
+    return parameters_alone(tmp_path_factory.mktemp("sound"), off=1.1)
+
+
+@pytest.fixture(scope="module")
+def sprung(tmp_path_factory):
+    spring = SpringParallel(stiffness_Nm_per_rad=0.004, rest_angle_rad=0.3)
+    return parameters_alone(tmp_path_factory.mktemp("sprung"), spring)
+
+
+def test_a_machine_whose_values_alone_are_wrong_leaves_the_sensors_noise(sound):
+    own = in_sensor_noise(sound.base_estimator)
+    fit = own.fit(sound.base.hypothesis, sound.base.x, iterations=12)
+    assert 0.8 < misfit(own, fit.hypothesis, fit.x) < 1.2
+    found = with_whole_runs(sound, lambda text: None)
+    assert found.sound
+    assert not found.complete
+    assert not found.steps
+
+
+def test_a_spring_that_a_slow_torque_hides_is_found_from_whole_recordings(sprung):
+    found = with_whole_runs(sprung, lambda text: None)
+    assert found.left_by_parameters > INCOMPLETE
+    assert found.complete
+    assert [step.law.effect for step in found.steps] == [SpringParallel.effect]
+    values = found.problem.values(found.best.hypothesis, found.best.x)[1][-1]
+    assert values["stiffness_Nm_per_rad"] == pytest.approx(0.004, rel=0.1)
+    own = in_sensor_noise(sprung.base_estimator)
+    assert misfit(own, found.best.hypothesis, found.best.x) < COMPLETE
+
+
+def test_what_no_prediction_shows_is_no_number(sound):
+    own = in_sensor_noise(sound.base_estimator)
+    x = sound.base.x.copy()
+    x[0] = np.nan
+    assert misfit(own, sound.base.hypothesis, x) == np.inf
+
+
+def test_laws_that_windows_showed_are_complete_where_they_leave_as_little(sprung):
+    complete = with_whole_runs(sprung, lambda text: None)
+    shown = replace(complete, base_estimator=sprung.base_estimator, complete=False)
+    assert confirmed_by_whole_runs(shown, lambda text: None).complete
+    nothing = replace(shown, best=sprung.base)
+    assert not confirmed_by_whole_runs(nothing, lambda text: None).complete
