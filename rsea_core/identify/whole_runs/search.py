@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
@@ -28,9 +29,8 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSES,
     RIVAL_SCALE,
-    RIVAL_SHARE,
-    WHOLE_FORMS,
     WHOLE_LAWS,
+    WHOLE_RIVALS,
     WHOLE_TRIED,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
@@ -41,7 +41,7 @@ SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
 
 @dataclass(frozen=True, kw_only=True)
 class Trial:
-    """One law beside others, fitted to whole recordings.
+    """One candidate beside other laws, fitted to whole recordings.
 
     Attributes
     ----------
@@ -51,10 +51,15 @@ class Trial:
         Misfit [noise deviations].
     """
 
-    law: Law
+    candidate: Candidate
     fit: Estimate
     gain: float
     left: float
+
+    @property
+    def law(self) -> Law:
+        """The candidate's law."""
+        return self.candidate.law
 
 
 @dataclass
@@ -83,12 +88,11 @@ class _Search:
         trials = self.trials()
         if not trials or trials[0].gain < LEAST_OF_LEFT * self.plain_excess():
             return False
-        best = _plainest(trials)
-        others = [t for t in trials if t is not best]
+        best = trials[0]
         say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
         self.fit = best.fit
         self.taken.append(best.law)
-        self.rivals[best.law.key] = others
+        self.rivals[best.law.key] = trials
         return True
 
     def plain_excess(self) -> float:
@@ -99,16 +103,20 @@ class _Search:
         """Candidates fitted beside what was taken, best first."""
         have = {(law.effect, law.sensor) for law in self.taken}
         left = [w for w in self.laws if (w.effect, w.sensor) not in have]
-        found = []
         screened = screen(self.own, self.fit, left)
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
-        for c in _most_promising(screened):
-            fit = fitted(self.own, self.fit, c, factors=SIZES)
-            gain = self.fit.cost - fit.cost - PER_VALUE * count_values(c.law)
+        return self.fitted(self.fit, _most_promising(screened))
+
+    def fitted(self, base: Estimate, candidates: Sequence[Candidate]) -> list[Trial]:
+        """Candidates fitted beside a fit, best first."""
+        found = []
+        for c in candidates:
+            fit = fitted(self.own, base, c, factors=SIZES)
+            gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
             if np.isfinite(gain) and not at_bound(self.own.problem, fit, c.law):
-                left_by = misfit(self.own, fit.hypothesis, fit.x)
-                found.append(Trial(law=c.law, fit=fit, gain=gain, left=left_by))
+                left = misfit(self.own, fit.hypothesis, fit.x)
+                found.append(Trial(candidate=c, fit=fit, gain=gain, left=left))
         return sorted(found, key=lambda t: -t.gain)
 
     def prune(self, say) -> None:
@@ -120,6 +128,22 @@ class _Search:
                 self.fit = less
                 self.taken.remove(law)
 
+    def compare(self, say) -> None:
+        """Each law against its rivals beside the others; the plainest of those alike is taken."""
+        for law in tuple(self.taken):
+            trials = self.rivals[law.key]
+            if len(self.taken) > 1:  # they were fitted beside other laws
+                near = [t.candidate for t in _best_of_each_effect(trials)[:WHOLE_RIVALS]]
+                trials = self.fitted(self.without(law), near)
+            if not trials:
+                continue
+            best = _plainest(trials, self.doubt())
+            if best.law is not law:
+                say(f"  whole recordings: {best.law.key} in place of {law.key}")
+            self.fit = best.fit
+            self.taken = [w for w in self.taken if w is not law] + [best.law]
+            self.rivals[best.law.key] = trials
+
     def without(self, law: Law) -> Estimate:
         """The fit with one law less."""
         kept, keep = [], [True] * len(self.own.problem.nominals)
@@ -130,25 +154,34 @@ class _Search:
 
 
 def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
-    """The best of each effect and reading, in no more than some forms."""
-    found, forms = [], {}
+    """Of each effect and reading the best law and the one with the fewest values."""
+    forms: dict[tuple, list[Candidate]] = {}
     for c in sorted(screened, key=lambda c: -c.gain):
-        place = (c.law.effect, c.law.sensor)
-        forms[place] = forms.get(place, 0) + 1
-        if forms[place] <= WHOLE_FORMS:
-            found.append(c)
+        forms.setdefault((c.law.effect, c.law.sensor), []).append(c)
+    found = []
+    for laws in forms.values():
+        plain = min(laws, key=lambda c: count_values(c.law))
+        found += [laws[0]] if plain is laws[0] else [laws[0], plain]
     return found[:WHOLE_TRIED]
 
 
-def _plainest(trials: Sequence[Trial]) -> Trial:
-    """Of an effect's laws that gain about as much as the best, the one with the fewest values."""
-    first = trials[0]
-    alike = [
-        t for t in trials
-        if t.law.effect == first.law.effect and t.law.sensor == first.law.sensor
-        and t.gain > (1.0 - RIVAL_SHARE) * first.gain
-    ]  # fmt: skip
-    return min(alike, key=lambda t: count_values(t.law))
+def _best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
+    """The best trial of each effect and reading, best first."""
+    found: dict[tuple, Trial] = {}
+    for t in trials:
+        found.setdefault((t.law.effect, t.law.sensor), t)
+    return list(found.values())
+
+
+def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
+    """Of laws that gain as much as the best, as far as can be told, the plainest.
+
+    Every machine rubs: where friction explains as much, no dead zone of the drive is named.
+    """
+    alike = [t for t in trials if t.gain > trials[0].gain - doubt]
+    return min(
+        alike, key=lambda t: (t.law.effect == DriveDeadZone.effect, count_values(t.law), -t.gain)
+    )
 
 
 def with_whole_runs(found: Found, say) -> Found:
@@ -166,6 +199,7 @@ def with_whole_runs(found: Found, say) -> Found:
     if search.left() > search.enough:
         return found
     search.prune(say)
+    search.compare(say)
     return _complete(found, search)
 
 
@@ -194,8 +228,7 @@ def _complete(found: Found, search: _Search) -> Found:
     for law in search.taken:
         without = search.plain if len(search.taken) == 1 else search.without(law)
         gain = without.cost - search.fit.cost - PER_VALUE * count_values(law)
-        # rivals of an earlier law were fitted beside fewer laws
-        rivals = search.rivals[law.key] if law is search.taken[-1] else ()
+        rivals = [t for t in _best_of_each_effect(search.rivals[law.key]) if t.law is not law]
         steps.append(
             Step(law=law, screened=gain, gain=gain, ratio=np.inf, tempering=own.tempering,
                  rivals=tuple((t.law, t.gain) for t in rivals), doubt=search.doubt())
