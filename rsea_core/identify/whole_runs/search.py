@@ -29,6 +29,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSES,
     RIVAL_SCALE,
+    WHOLE_FORMS,
     WHOLE_LAWS,
     WHOLE_RIVALS,
     WHOLE_TRIED,
@@ -154,14 +155,14 @@ class _Search:
 
 
 def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
-    """Of each effect and reading the best law and the one with the fewest values."""
+    """Of each effect and reading the best laws and the one with the fewest values."""
     forms: dict[tuple, list[Candidate]] = {}
     for c in sorted(screened, key=lambda c: -c.gain):
         forms.setdefault((c.law.effect, c.law.sensor), []).append(c)
     found = []
     for laws in forms.values():
         plain = min(laws, key=lambda c: count_values(c.law))
-        found += [laws[0]] if plain is laws[0] else [laws[0], plain]
+        found += laws[:WHOLE_FORMS] + ([] if plain in laws[:WHOLE_FORMS] else [plain])
     return found[:WHOLE_TRIED]
 
 
