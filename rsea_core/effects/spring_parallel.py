@@ -116,8 +116,7 @@ class SpringParallel(Term):
         unknowns, k = _linear_unknowns(typical)
         return (
             Law(effect=cls.effect, law=cls.law, subsystem="load", write=_write, kind=cls,
-                richer=(StiffeningParallel.law,), unknowns=unknowns,
-                starts=((0.3 * k, 0.0), (2.0 * k, 0.0))),
+                unknowns=unknowns, starts=((0.3 * k, 0.0), (2.0 * k, 0.0))),
         )  # fmt: skip
 
     @classmethod

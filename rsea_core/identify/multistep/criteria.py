@@ -79,6 +79,7 @@ COMPLETE_SHARE = 0.08  # or of what parameters alone leave: small things that ev
 DOUBT = 0.1  # of what is left above the noise, in units: by so much rivals are not told apart
 LEAST_OF_LEFT = 0.02  # of what laws gained on whole recordings so far: least gain of a further one
 WHOLE_LAWS, WHOLE_TRIED, WHOLE_FORMS = 3, 16, 2  # laws at most, fitted each time, of one effect
+LEFT_OF_EACH = 0.9  # of the misfit: a law that leaves more of it is none that completes a model
 WHOLE_RIVALS = 4  # of each law, fitted beside the others
 OUTPUT_ERROR = 0.05  # of the estimated unknown torques, in a fit of whole predictions
 NEARLY_ABSENT = (0.2, 0.05, 0.01)  # of the screened size: starts of a law that fitted worse

@@ -26,6 +26,7 @@ from rsea_core.identify.multistep.criteria import (
     DOUBT,
     INCOMPLETE,
     LEAST_OF_LEFT,
+    LEFT_OF_EACH,
     PER_VALUE,
     PULSES,
     RIVAL_SCALE,
@@ -90,6 +91,8 @@ class _Search:
         if not trials or trials[0].gain < LEAST_OF_LEFT * self.plain_excess():
             return False
         best = trials[0]
+        if best.left > LEFT_OF_EACH * self.left():
+            return False
         say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
         self.fit = best.fit
         self.taken.append(best.law)
