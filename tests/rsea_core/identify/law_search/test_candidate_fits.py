@@ -1,14 +1,21 @@
 """What is compared is comparable: laws at one share of independent innovations, mass by prior."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from rsea_core.effects.load_disturbance import disturbance
 from rsea_core.effects.load_unbalance import unbalance
-from rsea_core.identify.law_search.candidate_fits import cost_of_mass, gain_of, values_at_bound
+from rsea_core.identify.law_search.candidate_fits import (
+    cost_of_mass,
+    even_ratio,
+    gain_of,
+    values_at_bound,
+)
 from rsea_core.identify.law_search.screening import Candidate
+from rsea_core.identify.multistep.criteria import EVEN
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import Hypothesis, MultistepProblem
 from tests.cases.one_axis import pendulum_case
@@ -46,3 +53,20 @@ def test_a_value_at_a_bound_that_belongs_to_its_law_is_found_and_others_are_stop
     x = problem.start(h, [(1.0, 0.5, 5.0, 1.0)])  # fifty torques at its peak, flanks throughout
     fit = replace(estimate(0.0), hypothesis=h, x=x)
     assert values_at_bound(problem, fit, law) == ("peak_Nm",)
+
+
+def test_what_each_recording_shows_once_is_even_between_recordings():
+    """A constant of a reading: all of its gain is in the first row of each recording."""
+    rows, recordings = 400, 3
+    track = SimpleNamespace(
+        experiment=SimpleNamespace(recording=SimpleNamespace(sample_time_s=0.01)), block=1,
+        scale=SimpleNamespace(time_s=0.1),
+    )  # fmt: skip
+    own = SimpleNamespace(tracks=[track] * recordings, tempering=1.0)
+    before = [np.full((1, rows, 1), 0.5) for _ in range(recordings)]
+    after = [e.copy() for e in before]
+    for e in before:
+        e[0, 0] = 4.0
+    whole = even_ratio(own, before, after, whole=True)
+    assert whole == pytest.approx(np.sqrt(recordings) / EVEN)  # all alike
+    assert even_ratio(own, before, after) < 0.5 * whole

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_core.effects.load_drag import LoadDrag
 from rsea_core.effects.spring_parallel import SpringParallel
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import settled
@@ -18,9 +19,8 @@ from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 
 def parameters_alone(folder, *terms, off=1.0):
-    """Parameters fitted to two recordings of an axis, as a search begins."""
-    recordings = (axis_recording(*terms, seed=seed) for seed in (1, 2))
-    case = axis_case(folder, *recordings, rig=axis_rig(off=off))
+    """Parameters fitted to a recording of an axis, as a search begins."""
+    case = axis_case(folder, axis_recording(*terms, seed=1), rig=axis_rig(off=off))
     h = Hypothesis(laws=nuisances(case))
     estimator, base, horizon = parameters_with_timing(case, h, lambda text: None)
     estimator, base = with_fine_steps(estimator, base, lambda text: None, per_cycle=50)
@@ -40,6 +40,11 @@ def sprung(tmp_path_factory):
     return parameters_alone(tmp_path_factory.mktemp("sprung"), spring)
 
 
+@pytest.fixture(scope="module")
+def completed(sprung):
+    return with_whole_runs(sprung, lambda text: None)
+
+
 def test_a_machine_whose_values_alone_are_wrong_leaves_the_sensors_noise(sound):
     own = in_sensor_noise(sound.base_estimator)
     fit = own.fit(sound.base.hypothesis, sound.base.x, iterations=12)
@@ -50,8 +55,8 @@ def test_a_machine_whose_values_alone_are_wrong_leaves_the_sensors_noise(sound):
     assert not found.steps
 
 
-def test_a_spring_that_a_slow_torque_hides_is_found_from_whole_recordings(sprung):
-    found = with_whole_runs(sprung, lambda text: None)
+def test_a_spring_that_a_slow_torque_hides_is_found_from_whole_recordings(sprung, completed):
+    found = completed
     assert found.left_by_parameters > INCOMPLETE
     assert found.complete
     assert [step.law.effect for step in found.steps] == [SpringParallel.effect]
@@ -68,9 +73,15 @@ def test_what_no_prediction_shows_is_no_number(sound):
     assert misfit(own, sound.base.hypothesis, x) == np.inf
 
 
-def test_laws_that_windows_showed_are_complete_where_they_leave_as_little(sprung):
-    complete = with_whole_runs(sprung, lambda text: None)
-    shown = replace(complete, base_estimator=sprung.base_estimator, complete=False)
+def test_laws_that_windows_showed_are_complete_where_they_leave_as_little(sprung, completed):
+    shown = replace(completed, base_estimator=sprung.base_estimator, complete=False)
     assert confirmed_by_whole_runs(shown, lambda text: None).complete
     nothing = replace(shown, best=sprung.base)
     assert not confirmed_by_whole_runs(nothing, lambda text: None).complete
+
+
+def test_two_effects_are_found_one_after_the_other(tmp_path):
+    terms = (SpringParallel(stiffness_Nm_per_rad=0.02), LoadDrag(torque_at_5_rad_per_s_Nm=0.05))
+    found = with_whole_runs(parameters_alone(tmp_path, *terms), lambda text: None)
+    assert found.complete
+    assert {step.law.effect for step in found.steps} == {SpringParallel.effect, LoadDrag.effect}
