@@ -38,7 +38,7 @@ def investigate(
     found = begun(case, None, say, quick=quick)
     if not quick:
         found = with_whole_runs(found, say)
-    if not found.complete:
+    if not (found.complete or found.sound):
         add_all(found, laws_of(found), say, quick=quick)
         found = _in_doubt(case, found, say, quick=quick)
         if not quick:

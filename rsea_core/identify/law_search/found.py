@@ -7,7 +7,7 @@ import numpy as np
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
-from rsea_core.identify.multistep.criteria import INCOMPLETE
+from rsea_core.identify.multistep.criteria import SOUND
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 
@@ -92,7 +92,7 @@ class Found:
     @property
     def sound(self) -> bool:
         """Whether parameters alone predict whole recordings to the sensors' noise."""
-        return self.left_by_parameters < INCOMPLETE
+        return self.left_by_parameters < SOUND
 
     @property
     def predicts_longer(self) -> bool:
