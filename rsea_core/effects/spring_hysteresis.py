@@ -210,7 +210,9 @@ class SpringHysteresis(Hysteresis):
         """One to six elements."""
         K, d = typical.stiffness, typical.deflection_rad
         low, high = (2e-3 * d, 10.0 * d) if typical.relative else (2e-4, 1.0)
-        stiffest = (30.0 if typical.relative else 3.0) * K  # rubbing coils begin very stiff
+        stiffest = (
+            30.0 if typical.relative else 3.0
+        ) * K  # dry friction begins stiff
         elements = [
             (
                 Unknown(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=stiffest,
@@ -233,7 +235,7 @@ class SpringHysteresis(Hysteresis):
             found = tuple(v for share in shares for v in (stiffness / len(shares), share * d))
             return (*found, *at_begin)
 
-        def rubbing(shares: Sequence[float], torque: float) -> tuple[float, ...]:
+        def dry_friction(shares: Sequence[float], torque: float) -> tuple[float, ...]:
             found = (v for share in shares for v in (torque / (len(shares) * share * d), share * d))
             return (*found, *at_begin)
 
@@ -244,12 +246,12 @@ class SpringHysteresis(Hysteresis):
                 starts=(start((0.1,), 0.05 * K), start((0.5,), 0.1 * K), start((1.5,), 0.1 * K)),
                 richer=("two slips", "four slips", "six slips", "bouc-wen"), **common),
             Law(law="two slips", unknowns=(*flat[:4], *begun),
-                starts=(start((0.15, 0.8), 0.15 * K), rubbing((0.06, 0.5), 0.3 * K * d)),
+                starts=(start((0.15, 0.8), 0.15 * K), dry_friction((0.06, 0.5), 0.3 * K * d)),
                 richer=("four slips", "six slips", "bouc-wen"), **common),
             Law(law="four slips", unknowns=(*flat[:8], *begun),
                 starts=(start((0.05, 0.2, 0.6, 1.6), 0.2 * K),
                         start((0.1, 0.35, 0.8, 3.0), 0.1 * K),
-                        rubbing((0.06, 0.2, 0.5, 1.0), 0.3 * K * d)), **common),
+                        dry_friction((0.06, 0.2, 0.5, 1.0), 0.3 * K * d)), **common),
             Law(law="six slips", unknowns=spaced,
                 starts=((*(0.05 * K,) * 6, 0.02 * d, 2.2, *at_begin),
                         (*(0.02 * K,) * 6, 0.05 * d, 2.0, *at_begin)), **common),

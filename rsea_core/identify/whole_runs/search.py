@@ -137,8 +137,12 @@ class _Search:
         for law in tuple(self.taken):
             trials = self.rivals[law.key]
             if len(self.taken) > 1:  # they were fitted beside other laws
-                near = [t.candidate for t in _best_of_each_effect(trials)[:WHOLE_RIVALS]]
-                trials = self.fitted(self.without(law), near)
+                others = {(w.effect, w.sensor) for w in self.taken if w is not law}
+                near = [
+                    t.candidate for t in _best_of_each_effect(trials)
+                    if (t.law.effect, t.law.sensor) not in others
+                ]  # fmt: skip
+                trials = self.fitted(self.without(law), near[:WHOLE_RIVALS])
             if not trials:
                 continue
             best = _plainest(trials, self.doubt())
@@ -180,7 +184,7 @@ def _best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
 def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
-    Every machine rubs: where friction explains as much, no dead zone of the drive is named.
+    Every machine has friction: where it explains as much, no dead zone of the drive is named.
     """
     alike = [t for t in trials if t.gain > trials[0].gain - doubt]
     return min(

@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from rsea_core.effects.gear_friction import GearFriction
@@ -17,10 +18,11 @@ def law(kind, sensor=None):
     return SimpleNamespace(effect=kind.effect, sensor=sensor)
 
 
-def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0):
-    step = SimpleNamespace(law=taken, gain=gain, ratio=ratio, tempering=tempering, rivals=rivals)
+def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0, doubt=None, complete=False):
+    step = SimpleNamespace(law=taken, gain=gain, ratio=ratio, tempering=tempering, rivals=rivals,
+                           doubt=doubt)  # fmt: skip
     problem = SimpleNamespace(case=SimpleNamespace(rig=Rig.preset("rsea-bench")))
-    return SimpleNamespace(steps=[step], problem=problem)
+    return SimpleNamespace(steps=[step], problem=problem, complete=complete)
 
 
 @pytest.fixture(autouse=True)
@@ -36,6 +38,16 @@ def test_a_law_that_explains_as_much_halves_which_and_leaves_that_something_is_t
     alike = found(law(GearFriction), (law(SpringHardening), 200.0))
     assert step_confidence(alike, 0, None) == pytest.approx(0.5, abs=0.01)
     assert step_presence(alike, 0, None) > 0.97
+
+
+def test_laws_that_leave_only_the_sensors_noise_are_judged_by_their_rivals_alone():
+    rival = (law(SpringHardening), 190.0)
+    weak = {"ratio": 0.0, "complete": True}
+    sure = found(law(GearFriction), rival, doubt=1.0, **weak)
+    assert step_confidence(sure, 0, None) == pytest.approx(0.97)
+    doubtful = found(law(GearFriction), rival, doubt=10.0, **weak)
+    assert step_confidence(doubtful, 0, None) == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))
+    assert step_confidence(sure, 0, HeldOut(gain=-1.0)) < 0.5
 
 
 def test_the_same_effect_in_another_reading_is_no_rival():

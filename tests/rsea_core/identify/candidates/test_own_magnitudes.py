@@ -12,8 +12,9 @@ from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig
 
 SMALL_AND_FAST = Units(torque=1e-6, time=1e-3)
 POWERS = {  # of torque and of time in each unit
-    "Nm": (1, 0), "Nm/rad": (1, 0), "Nms/rad": (1, 1), "kgm2": (1, 2), "rad": (0, 0),
-    "rad/s": (0, -1), "1/s": (0, -1), "Hz": (0, -1), "s": (0, 1), "-": (0, 0), "A": (0, 0),
+    "Nm": (1, 0), "Nm/rad": (1, 0), "Nm/rad^3": (1, 0), "Nms/rad": (1, 1), "kgm2": (1, 2),
+    "rad": (0, 0), "rad/s": (0, -1), "1/s": (0, -1), "Hz": (0, -1), "s": (0, 1),
+    "-": (0, 0), "A": (0, 0),
 }  # fmt: skip
 NAMED = {"torque_at_5_rad_per_s_Nm": (1, 2)}  # stands for a torque over a speed squared
 ABSOLUTE = {"drive-delay", "drive-thermal"}  # a nuisance; temperatures are no matter of torque

@@ -34,7 +34,7 @@ def test_of_both_sides_of_a_gear_the_value_that_may_err_by_more_at_the_output_is
     assert {output} == keys(case, **{motor: None, output: 0.02}) & {*sides}
 
 
-def test_what_is_held_beside_a_free_value_counts_on_that_values_side_of_the_gear():
+def test_what_is_held_jointly_with_a_free_value_counts_on_that_values_side_of_the_gear():
     rig = replace(
         axis_rig(), gear_ratio=RATIO, motor_inertia_kgm2=1e-3, output_inertia_kgm2=0.02,
         tolerances=(("motor_inertia_kgm2", 0.1), ("output_inertia_kgm2", 0.3)),

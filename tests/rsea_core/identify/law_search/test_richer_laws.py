@@ -23,9 +23,9 @@ def test_a_law_that_holds_another_is_fitted_no_worse(tmp_path):
     candidate = Candidate(law=plain, start=plain.starts[0], size=1.0, gain=1.0, held_out=1.0,
                           deviation=1.0)  # fmt: skip
     own, fit = settled(estimator, fitted(estimator, base, candidate), once=True)
-    said = []
-    richer_laws.with_richer_law((candidate, own, fit), base, list(laws.values()), said.append)
-    worth = {line.split()[1].rstrip(":"): float(line.split()[-1]) for line in said}
+    lines = []
+    richer_laws.with_richer_law((candidate, own, fit), base, list(laws.values()), lines.append)
+    worth = {line.split()[1].rstrip(":"): float(line.split()[-1]) for line in lines}
     assert worth["load-drag/power"] > -PER_VALUE - 1.0
 
 
