@@ -210,9 +210,7 @@ class SpringHysteresis(Hysteresis):
         """One to six elements."""
         K, d = typical.stiffness, typical.deflection_rad
         low, high = (2e-3 * d, 10.0 * d) if typical.relative else (2e-4, 1.0)
-        stiffest = (
-            30.0 if typical.relative else 3.0
-        ) * K  # dry friction begins stiff
+        stiffest = (30.0 if typical.relative else 3.0) * K  # dry friction begins stiff
         elements = [
             (
                 Unknown(name=f"stiffness_{j}_Nm_per_rad", unit="Nm/rad", low=0.0, high=stiffest,
