@@ -186,8 +186,7 @@ class ThresholdDeadZone(DriveDeadZone):
 
     Source
     ------
-    Tao & Kokotovic, Adaptive Control of Systems with Actuator and Sensor Nonlinearities (1996),
-    chapter 2, has the zone without a step; the step is that of a comparator.
+    A comparator before an amplifier; tanh for the step is ours.
     """
 
     law: ClassVar[str] = "threshold"
@@ -198,7 +197,9 @@ class ThresholdDeadZone(DriveDeadZone):
         return {"command_threshold": self.width_duty}
 
     def equation(self) -> str:
-        return f"acting duty = duty where |duty| > {self.width_duty:g}, else 0 (over 10 % of it)"
+        return (
+            f"acting duty = duty where |duty| > {self.width_duty:g}, else 0; the step is 10 % wide"
+        )
 
     @classmethod
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:

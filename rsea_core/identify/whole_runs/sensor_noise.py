@@ -4,8 +4,8 @@ The filter of the multistep search takes what a model lacks for an unknown torqu
 of each hypothesis is free to hold: a slow torque takes the place of a parallel spring. Here the
 readings keep the noise that their fastest changes show, and unknown torques are as good as none.
 A model that is complete leaves one deviation of that noise; what leaves many lacks something.
-Output-error identification with known noise: Ljung, System Identification (1999), section 3.3;
-the test of the misfit: Pearson's, as in section 16.6 there.
+The output-error structure: Ljung, System Identification (1999), section 4.2; the analysis of what
+is left: section 16.6.
 """
 
 from dataclasses import replace
