@@ -36,13 +36,14 @@ def investigate(
     for file in shared:
         say(f"{file}: two thirds are fitted: no other recording lets the load move")
     found = begun(case, None, say, quick=quick)
+    nearly = None
     if not quick:
-        found = with_whole_runs(found, say)
+        found, nearly = with_whole_runs(found, say)
     if not (found.complete or found.sound):
         add_all(found, laws_of(found), say, quick=quick)
         found = _in_doubt(case, found, say, quick=quick)
         if not quick:
-            found = confirmed_by_whole_runs(found, say)
+            found = confirmed_by_whole_runs(found, nearly, say)
     found.shared = shared
     return found
 

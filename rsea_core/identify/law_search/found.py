@@ -70,7 +70,9 @@ class Found:
         What parameters alone leave of whole recordings, in deviations of the sensors' noise
         (`whole_runs`); inf: not known.
     complete : bool
-        Whether the laws leave nothing of whole recordings but that noise.
+        Whether laws stand by whole recordings: they leave nothing but that noise, or little more.
+    explained : float
+        Share of what parameters alone leave beyond that noise, which complete laws explain.
     """
 
     problem: MultistepProblem
@@ -88,6 +90,7 @@ class Found:
     screened: list[Candidate] = field(default_factory=list)
     left_by_parameters: float = np.inf
     complete: bool = False
+    explained: float = 1.0
 
     @property
     def sound(self) -> bool:

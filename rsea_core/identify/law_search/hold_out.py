@@ -74,7 +74,7 @@ def held_out(found: Found) -> HeldOut | None:
     own, gain, ratio = found.estimator, 0.0, 0.0
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
     if unseen:
-        others = [_of_recordings(found, unseen, trial, found.horizon) for trial in trials]
+        others = [of_recordings(found, unseen, trial, found.horizon) for trial in trials]
         before, after = (o.innovations([t]) for o, t in zip(others, trials, strict=True))
         gain = own.tempering * (_power(before) - _power(after))
         if np.isfinite(gain):
@@ -99,7 +99,7 @@ def free_run(found: Found, e: Experiment, trial: tuple[Hypothesis, NDArray]) -> 
     h, x = trial
     if e.recording.initial_rest:
         return found.problem.predict(e, h, x[None])[0]
-    tracks = _of_recordings(found, [e], trial, SHORT).tracks
+    tracks = of_recordings(found, [e], trial, SHORT).tracks
     whole = windows_of(e.rows, e.rows, tracks[0].motion)
     machine = [found.problem.trial_machine(e, h, x)]
     return e.readings(e.runs(machine, whole), machine, whole)[0]
@@ -109,7 +109,7 @@ def _power(innovations: list[NDArray]) -> float:
     return sum(0.5 * float(np.sum(huber_squares(e))) for e in innovations)
 
 
-def _of_recordings(
+def of_recordings(
     found: Found, experiments: list[Experiment], trial, horizon: float | None
 ) -> Estimator:
     """An estimator of other recordings, in windows of a length, noise and blocks of those fitted.

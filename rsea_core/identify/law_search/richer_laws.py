@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_friction_angle import LoadFrictionAngle
@@ -35,7 +36,9 @@ def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
         if law is None or name in tried:
             continue
         tried.add(name)
-        more = _with_other_law(own, base, fit, law)
+        known = own.problem.values(fit.hypothesis, fit.x)[1][-1]
+        others = (fit.x[: -count_values(c.law)], base.x)
+        more = own.fit(*begun_with(own, base, law, known, others)[1:], iterations=8)
         better = fit.cost - more.cost - PER_VALUE * (count_values(law) - count_values(c.law))
         say(f"    richer {law.key}: {better:.1f}")
         if better > RICHER_GAIN and not at_bound(own.problem, more, law):
@@ -46,23 +49,30 @@ def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
     return c, own, fit
 
 
-def _with_other_law(own: Estimator, base: Estimate, fit: Estimate, law: Law) -> Estimate:
-    """A fit whose last law another takes the place of, from the best of its starts.
+def begun_with(
+    own: Estimator, base: Estimate, law: Law, known: dict[str, float], others: Sequence[NDArray]
+) -> tuple[float, Hypothesis, NDArray]:
+    """The likeliest start of a law of the same effect beside what is fitted already, and its cost.
 
-    Values that both laws have begin as they were found, and so do all others or those without
-    either law: what a richer law explains, a plainer one may have left to them.
+    Parameters
+    ----------
+    known : dict
+        Values of the law whose place it takes: those that both have begin as they were found.
+    others : sequence of (k,) array
+        All other values, from which a fit may begin: what a richer law explains, a plainer one
+        may have left to them.
     """
     problem, n = own.problem, len(own.problem.nominals)
-    found = problem.values(fit.hypothesis, fit.x)[1][-1]
     h = Hypothesis(laws=(*base.hypothesis.laws, law))
     starts = {
-        tuple(found.get(p.name, v) for p, v in zip(law.unknowns, start, strict=True))
+        tuple(known.get(p.name, v) for p, v in zip(law.unknowns, start, strict=True))
         for start in law.starts
     }
     begun = [problem.start(Hypothesis(laws=(law,)), [start])[n:] for start in sorted(starts)]
-    others = (fit.x[: -count_values(fit.hypothesis.laws[-1])], base.x)
     trials = [(h, np.concatenate([x, start])) for x in others for start in begun]
-    return own.fit(h, trials[int(np.argmin(own.costs(trials)))][1], iterations=8)
+    costs = own.costs(trials)
+    best = int(np.argmin(costs))
+    return float(costs[best]), *trials[best]
 
 
 def with_richer_rivals(

@@ -14,16 +14,17 @@ import numpy as np
 from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
-from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.pulses import pulses
+from rsea_core.identify.law_search.richer_laws import begun_with
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.criteria import (
     COMPLETE,
     COMPLETE_SHARE,
     DOUBT,
+    EXPLAINED,
     INCOMPLETE,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
@@ -37,6 +38,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit
+from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
 
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
 
@@ -76,6 +78,9 @@ class _Search:
     def __post_init__(self) -> None:
         self.fit, self.taken = self.plain, []
         self.rivals: dict[str, list[Trial]] = {}
+        self.ratios: dict[str, float] = {}
+        self.tried_forms: set[str] = set()
+        self.first: list[Trial] = []
 
     def doubt(self) -> float:
         """Units by which a law may lose against a rival by what nothing explains."""
@@ -88,16 +93,64 @@ class _Search:
     def add(self, say) -> bool:
         """Take the law that lowers the error most; whether there is one."""
         trials = self.trials()
-        if not trials or trials[0].gain < LEAST_OF_LEFT * self.plain_excess():
+        worth = [t.gain for t in trials[:1] if t.left <= LEFT_OF_EACH * self.left()]
+        if self.better_form(max(worth, default=0.0), say):
+            return True
+        if not worth or worth[0] < LEAST_OF_LEFT * self.plain_excess():
             return False
         best = trials[0]
-        if best.left > LEFT_OF_EACH * self.left():
-            return False
         say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
+        self.first = self.first or trials
         self.fit = best.fit
         self.taken.append(best.law)
         self.rivals[best.law.key] = trials
         return True
+
+    def better_form(self, gain: float, say) -> bool:
+        """Take another form of a law, if it is worth as much as a further law; whether it is.
+
+        A law that is not quite right leaves errors which a further, wrong one may follow.
+        """
+        trials = [t for law in self.taken for t in self.other_forms(law)]
+        best = max(trials, key=lambda t: t[1].gain, default=None)
+        if best is None:
+            return False
+        law, trial = best
+        least = max(gain - self.doubt(), LEAST_OF_LEFT * self.plain_excess())
+        if trial.gain < least or trial.left > LEFT_OF_EACH * self.left():
+            return False
+        say(f"  whole recordings: {trial.law.key} in place of {law.key} gains {trial.gain:.0f}")
+        self.fit = trial.fit
+        self.taken = [w for w in self.taken if w is not law] + [trial.law]
+        alone = replace(trial, gain=self.rivals[law.key][0].gain + trial.gain)
+        self.rivals[trial.law.key] = [alone, *self.rivals[law.key]]
+        return True
+
+    def other_forms(self, law: Law) -> list[tuple[Law, Trial]]:
+        """A taken law, and what laws of its effect that hold it gain in its place."""
+        forms = [w for w in self.laws if holds(w, law) and w.key not in self.tried_forms]
+        self.tried_forms |= {w.key for w in forms}
+        if not forms:
+            return []
+        own, h = self.own, self.fit.hypothesis
+        known = own.problem.values(h, self.fit.x)[1][h.laws.index(law)]
+        base = without(own, self.fit, law)
+        others = (other_values(own, self.fit, law), base.x)
+        begun = [begun_with(own, base, form, known, others) for form in forms]
+        found = []
+        for _, hypothesis, x in sorted(begun, key=lambda b: b[0])[:WHOLE_FORMS]:
+            form, fit = hypothesis.laws[-1], own.fit(hypothesis, x, iterations=8)
+            more = count_values(form) - count_values(law)
+            gain = self.fit.cost - fit.cost - PER_VALUE * more
+            if np.isfinite(gain) and not at_bound(own.problem, fit, form):
+                values = own.problem.values(hypothesis, fit.x)[1][-1]
+                c = Candidate(
+                    law=form, start=tuple(values[p.name] for p in form.unknowns), gain=gain,
+                    held_out=gain, deviation=0.0, size=1.0,
+                )  # fmt: skip
+                left = misfit(own, hypothesis, fit.x)
+                found.append((law, Trial(candidate=c, fit=fit, gain=gain, left=left)))
+        return found
 
     def plain_excess(self) -> float:
         """What parameters alone leave above the noise, in units."""
@@ -126,7 +179,7 @@ class _Search:
     def prune(self, say) -> None:
         """Take out laws without which the rest leaves as little."""
         for law in tuple(self.taken[:-1]):
-            less = self.without(law)
+            less = without(self.own, self.fit, law)
             if misfit(self.own, less.hypothesis, less.x) < self.enough:
                 say(f"  whole recordings: {law.key} is needless")
                 self.fit = less
@@ -142,7 +195,7 @@ class _Search:
                     t.candidate for t in _best_of_each_effect(trials)
                     if (t.law.effect, t.law.sensor) not in others
                 ]  # fmt: skip
-                trials = self.fitted(self.without(law), near[:WHOLE_RIVALS])
+                trials = self.fitted(without(self.own, self.fit, law), near[:WHOLE_RIVALS])
             if not trials:
                 continue
             best = _plainest(trials, self.doubt())
@@ -152,13 +205,20 @@ class _Search:
             self.taken = [w for w in self.taken if w is not law] + [best.law]
             self.rivals[best.law.key] = trials
 
-    def without(self, law: Law) -> Estimate:
-        """The fit with one law less."""
-        kept, keep = [], [True] * len(self.own.problem.nominals)
-        for other in self.fit.hypothesis.laws:
-            kept += [] if other is law else [other]
-            keep += [other is not law] * count_values(other)
-        return self.own.fit(Hypothesis(laws=tuple(kept)), self.fit.x[np.array(keep)], iterations=12)
+    def predict(self, say) -> None:
+        """Take out laws that do not predict rows which they were not fitted to."""
+        for law in tuple(self.taken):
+            less = without(self.own, self.fit, law)
+            predicts, self.ratios[law.key] = needed(self.own, self.fit, law, less)
+            if not predicts:
+                say(f"  whole recordings: {law.key} does not predict rows that it has not seen")
+                self.fit = less
+                self.taken.remove(law)
+
+    def complete(self, found: Found) -> bool:
+        """Whether the laws leave nothing but noise, and predict rows unseen."""
+        enough = bool(self.taken) and self.left() <= self.enough
+        return enough and predicts_unseen(found, self.own, self.fit, self.plain)
 
 
 def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
@@ -171,6 +231,13 @@ def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
         plain = min(laws, key=lambda c: count_values(c.law))
         found += laws[:WHOLE_FORMS] + ([] if plain in laws[:WHOLE_FORMS] else [plain])
     return found[:WHOLE_TRIED]
+
+
+def holds(law: Law, plainer: Law) -> bool:
+    """Whether a law has all values of another one of its effect and reading, and more."""
+    names, fewer = ({p.name for p in w.unknowns} for w in (law, plainer))
+    same = (law.effect, law.sensor) == (plainer.effect, plainer.sensor)
+    return same and fewer < names
 
 
 def _best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
@@ -192,32 +259,73 @@ def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     )
 
 
-def with_whole_runs(found: Found, say) -> Found:
-    """What was found, or the laws that leave nothing but the sensors' noise of whole recordings."""
+def with_whole_runs(found: Found, say) -> tuple[Found, Found | None]:
+    """What was found, or the laws that leave nothing but the sensors' noise of whole recordings.
+
+    Returns
+    -------
+    Found
+    Found or None
+        Where none does: the one law that leaves little more, for where windows show nothing.
+    """
     own = in_sensor_noise(found.base_estimator)
     plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
     left = misfit(own, plain.hypothesis, plain.x)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
     if not INCOMPLETE < left < np.inf:
-        return found
+        return found, None
     search = _Search(own, plain, laws_of(found), _enough(left))
     while search.left() > search.enough and len(search.taken) < WHOLE_LAWS and search.add(say):
         pass
-    if search.left() > search.enough:
-        return found
-    search.prune(say)
-    search.compare(say)
-    return _complete(found, search)
+    if search.left() <= search.enough:
+        search.prune(say)
+        search.compare(say)
+        search.predict(say)
+        if search.complete(found):
+            return _complete(found, search), None
+    return found, _nearly_complete(found, search, say)
 
 
-def confirmed_by_whole_runs(found: Found, say) -> Found:
-    """What windows showed, marked as complete if it leaves as little of whole recordings."""
-    if not found.steps or not INCOMPLETE < found.left_by_parameters < np.inf:
+def _nearly_complete(found: Found, search: _Search, say) -> Found | None:
+    """The first law that alone explains most of what parameters leave, of rows unseen too."""
+    own, plain = search.own, search.plain
+    excess_before = excess(own, plain.hypothesis, plain.x)
+    for trial in search.first:
+        explained = 1.0 - excess(own, trial.fit.hypothesis, trial.fit.x) / excess_before
+        if explained < EXPLAINED:
+            continue
+        predicts, ratio = needed(own, trial.fit, trial.law, plain)
+        if predicts and predicts_unseen(found, own, trial.fit, plain, 1.0 - EXPLAINED):
+            say(f"  whole recordings: {trial.law.key} explains {explained:.2f} of what is left")
+            search.fit, search.taken = trial.fit, [trial.law]
+            search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
+            return replace(_complete(found, search), explained=explained)
+    return None
+
+
+def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
+    """What windows showed, marked as complete if it leaves as little of whole recordings.
+
+    Parameters
+    ----------
+    nearly : Found or None
+        What stands instead where windows showed nothing, or what leaves more.
+    """
+    if not INCOMPLETE < found.left_by_parameters < np.inf:
         return found
     own, h = in_sensor_noise(found.base_estimator), found.best.hypothesis
     fit = own.fit(h, found.best.x, iterations=12)
-    left = misfit(own, h, fit.x)
+    left = misfit(own, h, fit.x) if found.steps else np.inf
+    if nearly is not None:
+        best, laws = nearly.best, [step.law for step in found.steps]
+        # a torque that acts once can follow what a law leaves once: as much is not enough of it
+        once = all(law.effect == LoadDisturbance.effect for law in laws)
+        share = 1.0 / LEFT_OF_EACH if once else LEFT_OF_EACH
+        if misfit(own, best.hypothesis, best.x) < share * left:
+            return nearly
+    if not found.steps:
+        return found
     say(f"whole recordings: what windows showed leaves {left:.2f}")
     return replace(found, complete=left <= _enough(found.left_by_parameters))
 
@@ -234,12 +342,14 @@ def _complete(found: Found, search: _Search) -> Found:
     fit = own.fit(fit.hypothesis, fit.x, iterations=4)
     steps = []
     for law in search.taken:
-        without = search.plain if len(search.taken) == 1 else search.without(law)
-        gain = without.cost - search.fit.cost - PER_VALUE * count_values(law)
+        alone = len(search.taken) == 1
+        less = search.plain if alone else without(search.own, search.fit, law)
+        gain = less.cost - search.fit.cost - PER_VALUE * count_values(law)
         rivals = [t for t in _best_of_each_effect(search.rivals[law.key]) if t.law is not law]
         steps.append(
-            Step(law=law, screened=gain, gain=gain, ratio=np.inf, tempering=own.tempering,
-                 rivals=tuple((t.law, t.gain) for t in rivals), doubt=search.doubt())
+            Step(law=law, screened=gain, gain=gain, ratio=search.ratios[law.key],
+                 tempering=own.tempering, rivals=tuple((t.law, t.gain) for t in rivals),
+                 doubt=search.doubt())
         )  # fmt: skip
     return replace(
         found, estimator=own, best=fit, steps=steps, horizon=None, base_shapes=[], shapes=[],

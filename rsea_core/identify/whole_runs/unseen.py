@@ -1,0 +1,98 @@
+"""Laws fitted to the first rows of each recording must predict the rows after them.
+
+On an axis that nothing pulls back, the path that small unlogged torques cause can be followed by a
+few flexible laws, as any curve can. Such laws say nothing of the rows that they were not fitted to;
+a law of the machine does, by most of what parameters alone leave there (hold-out validation:
+Ljung, System Identification (1999), section 16.6).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.variant import Law
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.candidate_fits import count_values, even_ratio
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.hold_out import of_recordings
+from rsea_core.identify.multistep.criteria import FITTED_ROWS, KEPT_RATIO, UNPREDICTED
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.kalman_filter import huber_squares
+
+
+def predicts_unseen(
+    found: Found, own: Estimator, fit: Estimate, plain: Estimate, most: float = UNPREDICTED
+) -> bool:
+    """Whether a fit predicts rows that it was not made of, by most of what parameters alone leave.
+
+    Recordings held out must not be predicted worse than by parameters alone.
+
+    Parameters
+    ----------
+    found : Found
+        The search before laws of whole recordings: its case, problem and noise.
+    own : Estimator
+        Of whole recordings in the sensors' noise.
+    plain : Estimate
+        Parameters alone.
+    most : float
+        Share of what they leave of the unseen rows, that the fit may leave.
+    """
+    if _left_unseen(own, fit) >= most * _left_unseen(own, plain):
+        return False
+    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    if not unseen:
+        return True
+    like = replace(found, estimator=own, horizon=None)
+    costs = []
+    for trial in ((fit.hypothesis, fit.x), (plain.hypothesis, plain.x)):
+        costs.append(_cost(of_recordings(like, unseen, trial, None), *trial))
+    return costs[0] < costs[1]
+
+
+def needed(own: Estimator, fit: Estimate, law: Law, less: Estimate) -> tuple[bool, float]:
+    """Whether a law of a fit predicts unseen rows, evenly; and how evenly it gains.
+
+    Parameters
+    ----------
+    less : Estimate
+        The fit without the law.
+
+    Returns
+    -------
+    bool
+    float
+        Gain over its deviation between equal shares of rows; inf for a torque that acts once.
+    """
+    ratio = np.inf
+    if law.effect != LoadDisturbance.effect:
+        before, after = (own.innovations([(f.hypothesis, f.x)]) for f in (less, fit))
+        ratio = even_ratio(own, before, after)
+    return ratio >= KEPT_RATIO and _left_unseen(own, fit) < _left_unseen(own, less), ratio
+
+
+def without(own: Estimator, fit: Estimate, law: Law) -> Estimate:
+    """The fit with one law less."""
+    kept = tuple(w for w in fit.hypothesis.laws if w is not law)
+    return own.fit(Hypothesis(laws=kept), other_values(own, fit, law), iterations=12)
+
+
+def other_values(own: Estimator, fit: Estimate, law: Law) -> NDArray:
+    """All values of a fit but those of one law."""
+    keep = [True] * len(own.problem.nominals)
+    for other in fit.hypothesis.laws:
+        keep += [other is not law] * count_values(other)
+    return fit.x[np.array(keep)]
+
+
+def _left_unseen(own: Estimator, fit: Estimate) -> float:
+    """Cost of the rows after the first ones, to which alone the fit is made once more."""
+    first = own.having([replace(t, seen=FITTED_ROWS) for t in own.tracks])
+    x = first.fit(fit.hypothesis, fit.x, iterations=8).x
+    return _cost(own, fit.hypothesis, x) - _cost(first, fit.hypothesis, x)
+
+
+def _cost(own: Estimator, h: Hypothesis, x: NDArray) -> float:
+    return sum(0.5 * float(np.sum(huber_squares(e))) for e in own.innovations([(h, x)]))
