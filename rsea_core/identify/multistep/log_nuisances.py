@@ -18,6 +18,7 @@ from rsea_core.effects.sensor_base import writes_reading
 from rsea_core.effects.variant import Law, RunConditions, Unknown, writes_numbers
 from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, VELOCITIES
 from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND
+from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
@@ -47,8 +48,10 @@ def nuisances(case: Case) -> tuple[Law, ...]:
     servo = any(r.command_name == POSITION_COMMAND for r in driven)
     span = max(_span(r) for r in driven)
     row = max(r.sample_time_s for r in driven)
-    if span == 0.0:
-        return (*clocks[1:], *lags)
+    if span == 0.0:  # an amplifier that is on has an offset at a command of zero too
+        full = _full_scale(driven[0].command_name, case.rig)
+        offsets = (DriveOffset.nuisance(full, OFFSET_PRIOR),) if full else ()
+        return (*offsets, *clocks[1:], *lags)
     delay = Unknown(
         name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row,
         scale=DELAY_STEP_ROWS * row, prior=(SERVO_DELAY_ROWS if servo else DELAY_PRIOR_ROWS) * row,
@@ -71,6 +74,13 @@ def _span(r: Recording) -> float:
     if r.command_name == POSITION_COMMAND:
         command = command - np.mean(command)
     return float(np.max(np.abs(command)))
+
+
+def _full_scale(command: str, rig: Rig) -> float | None:
+    """Largest command that the drive takes, as far as the rig file states it."""
+    return {
+        "duty": 1.0, "voltage_V": rig.supply_voltage_V, "current_command_A": rig.current_limit_A,
+    }.get(command)  # fmt: skip
 
 
 def _lags(case: Case) -> tuple[Law, ...]:

@@ -317,8 +317,9 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     own, h = in_sensor_noise(found.base_estimator), found.best.hypothesis
     fit = own.fit(h, found.best.x, iterations=12)
     left = misfit(own, h, fit.x) if found.steps else np.inf
+    laws = [step.law for step in found.steps]
     if nearly is not None:
-        best, laws = nearly.best, [step.law for step in found.steps]
+        best = nearly.best
         # a torque that acts once can follow what a law leaves once: as much is not enough of it
         once = all(law.effect == LoadDisturbance.effect for law in laws)
         share = 1.0 / LEFT_OF_EACH if once else LEFT_OF_EACH
@@ -327,7 +328,10 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     if not found.steps:
         return found
     say(f"whole recordings: what windows showed leaves {left:.2f}")
-    return replace(found, complete=left <= _enough(found.left_by_parameters))
+    complete = left <= _enough(found.left_by_parameters) and all(
+        needed(own, fit, law, without(own, fit, law))[0] for law in laws
+    )
+    return replace(found, complete=complete)
 
 
 def _enough(left: float) -> float:

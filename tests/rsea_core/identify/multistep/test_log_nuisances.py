@@ -1,9 +1,10 @@
-"""What belongs to a log is free in every hypothesis: the rounding of the stated gear ratio."""
+"""What belongs to a log is free in every hypothesis: the gear ratio's rounding, an offset."""
 
 from dataclasses import replace
 
 import pytest
 
+from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.identify.multistep.log_nuisances import RATIO, half_digit, nuisances
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -31,3 +32,14 @@ def test_the_rounding_is_free_only_where_both_angles_are_read(tmp_path):
     rig = replace(axis_rig(), gear_ratio=42.57)
     free = [{law.effect for law in nuisances(axis_case(tmp_path, r, rig=rig))} for r in (one, both)]
     assert [RATIO in effects for effects in free] == [False, True]
+
+
+def test_an_amplifier_has_an_offset_where_its_command_is_zero(tmp_path):
+    moved = axis_recording(seed=1)
+    still = replace(moved, columns=moved.columns | {"current_command_A": 0.0 * moved.time_s})
+    offset = nuisances(axis_case(tmp_path, still, rig=axis_rig()))[0]
+    assert offset.effect == DriveOffset.effect
+    assert offset.unknowns[0].high == axis_rig().current_limit_A
+    unstated = replace(axis_rig(), current_limit_A=None)
+    laws = nuisances(axis_case(tmp_path, still, rig=unstated))
+    assert DriveOffset.effect not in {law.effect for law in laws}

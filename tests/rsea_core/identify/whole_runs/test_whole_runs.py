@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.load_drag import LoadDrag
-from rsea_core.effects.spring_parallel import SpringParallel
+from rsea_core.effects.spring_parallel import SpringParallel, StiffeningParallel
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import settled
 from rsea_core.identify.law_search.found import Found
@@ -42,15 +42,16 @@ def sprung(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def completed(sprung):
-    return with_whole_runs(sprung, lambda text: None)
+    return with_whole_runs(sprung, lambda text: None)[0]
 
 
 def test_a_machine_whose_values_alone_are_wrong_leaves_the_sensors_noise(sound):
     own = in_sensor_noise(sound.base_estimator)
     fit = own.fit(sound.base.hypothesis, sound.base.x, iterations=12)
     assert 0.8 < misfit(own, fit.hypothesis, fit.x) < 1.2
-    found = with_whole_runs(sound, lambda text: None)
+    found, nearly = with_whole_runs(sound, lambda text: None)
     assert found.sound
+    assert nearly is None
     assert not found.complete
     assert not found.steps
 
@@ -75,13 +76,33 @@ def test_what_no_prediction_shows_is_no_number(sound):
 
 def test_laws_that_windows_showed_are_complete_where_they_leave_as_little(sprung, completed):
     shown = replace(completed, base_estimator=sprung.base_estimator, complete=False)
-    assert confirmed_by_whole_runs(shown, lambda text: None).complete
-    nothing = replace(shown, best=sprung.base)
-    assert not confirmed_by_whole_runs(nothing, lambda text: None).complete
+    assert confirmed_by_whole_runs(shown, None, lambda text: None).complete
+    wrong = replace(shown, best=sprung.base)
+    assert not confirmed_by_whole_runs(wrong, None, lambda text: None).complete
+
+
+def test_one_law_that_is_nearly_all_stands_where_windows_show_nothing_or_leave_more(
+    sprung, completed
+):
+    nearly = replace(completed, explained=0.9)
+    left = completed.left_by_parameters
+    nothing = replace(sprung, left_by_parameters=left)
+    assert confirmed_by_whole_runs(nothing, nearly, lambda text: None) is nearly
+    wrong = replace(completed, best=sprung.base, complete=False)
+    assert confirmed_by_whole_runs(wrong, nearly, lambda text: None) is nearly
+    as_good = replace(completed, base_estimator=sprung.base_estimator, complete=False)
+    assert confirmed_by_whole_runs(as_good, nearly, lambda text: None) is not nearly
+
+
+def test_a_law_with_more_values_takes_the_place_of_one_that_is_not_quite_it(tmp_path):
+    spring = StiffeningParallel(stiffness_Nm_per_rad=0.01, cubic_Nm_per_rad3=0.05, up_to_rad=9.0)
+    found, _ = with_whole_runs(parameters_alone(tmp_path, spring), lambda text: None)
+    assert found.complete
+    assert [step.law.key for step in found.steps] == ["spring-parallel/cubic"]
 
 
 def test_two_effects_are_found_one_after_the_other(tmp_path):
     terms = (SpringParallel(stiffness_Nm_per_rad=0.02), LoadDrag(torque_at_5_rad_per_s_Nm=0.05))
-    found = with_whole_runs(parameters_alone(tmp_path, *terms), lambda text: None)
+    found, _ = with_whole_runs(parameters_alone(tmp_path, *terms), lambda text: None)
     assert found.complete
     assert {step.law.effect for step in found.steps} == {SpringParallel.effect, LoadDrag.effect}
