@@ -11,7 +11,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook, summed
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import TypicalMagnitudes
+from rsea_core.effects.typical import LEAST_CYCLES, RANGE, TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
@@ -66,7 +66,7 @@ def _further(what: str, wave: int):
         return parameter(
             float(wave),
             unit="-",
-            bounds=(1.0, 400.0),
+            bounds=(0.1, 1e6),
             source="a multiple of slots and poles",
             free=False,
             meaning=f"Periods of the {which} wave in a turn of the motor.",
@@ -81,6 +81,7 @@ def _further(what: str, wave: int):
 
 
 CYCLES_TRIED = tuple(range(1, 49))
+WAVES_TRIED = 60  # in the travel of a linear motor
 
 
 def cogging(typical: TypicalMagnitudes, cycles: tuple[int, ...]) -> Law:
@@ -101,13 +102,47 @@ def cogging(typical: TypicalMagnitudes, cycles: tuple[int, ...]) -> Law:
     )  # fmt: skip
 
 
+def linear_motor_cogging(typical: TypicalMagnitudes) -> list[Law]:
+    """Waves over the position of a linear motor, whose pitch no rig file states: it is fitted.
+
+    Starts are half a wave apart in the travel: a wave that is off by a quarter is still in phase
+    with the true one over most of it. Iron-core motors have harmonics: the second law has two.
+    """
+    one_wave = 2.0 * np.pi / (RANGE * typical.angle_rad)  # cycles in 2 pi m
+    ripple = 0.05 * typical.motor_torque_Nm
+    size = {"low": -20 * ripple, "high": 20 * ripple, "scale": 0.2 * ripple}
+    first = [Unknown(name=f"{p}_Nm", unit="Nm", **size) for p in ("sin", "cos")]
+    second = [Unknown(name=f"{p}_2_Nm", unit="Nm", **size) for p in ("sin", "cos")]
+    pitch = Unknown(
+        name="cycles_per_rev", unit="-", low=0.5 * one_wave, high=2 * WAVES_TRIED * one_wave,
+        scale=0.02 * one_wave,
+    )  # fmt: skip
+    waves = np.arange(LEAST_CYCLES, WAVES_TRIED, 0.5) * one_wave
+    common = {
+        "effect": "motor-cogging", "subsystem": "gear", "write": _write, "kind": MotorCogging,
+        "parameters": _parameters,
+    }  # fmt: skip
+    return [
+        Law(law="free pitch", unknowns=(*first, pitch), richer=("free pitch, two waves",),
+            starts=tuple((0.1 * ripple, 0.0, float(c)) for c in waves), **common),
+        Law(law="free pitch, two waves", unknowns=(*first, pitch, *second),
+            starts=((0.1 * ripple, 0.0, float(waves[0]), 0.02 * ripple, 0.0),), **common),
+    ]  # fmt: skip
+
+
+def _cycles(v: Values, wave: str) -> float:
+    """Cycles of a wave: of a second one without its own, twice those of the first."""
+    own = v.get(f"cycles_{wave}per_rev")
+    return 2.0 * v["cycles_per_rev"] if own is None else own
+
+
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Up to three waves of torque over the motor's angle."""
     for at, wave in zip(COGGING_HARMONICS, ("", "2_", "3_"), strict=True):
         if f"sin_{wave}Nm" in v:
             a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
             d.put(at, w.ratio * float(np.hypot(a, b)))
-            d.put(at + 1, v[f"cycles_{wave}per_rev"] * w.ratio)
+            d.put(at + 1, _cycles(v, wave) * w.ratio)
             d.put(at + 2, float(np.arctan2(b, a)))
 
 
@@ -119,7 +154,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
             a, b = v[f"sin_{wave}Nm"], v[f"cos_{wave}Nm"]
             given |= {
                 f"amplitude_{wave}Nm": float(np.hypot(a, b)),
-                f"cycles_{wave}per_rev": v[f"cycles_{wave}per_rev"],
+                f"cycles_{wave}per_rev": _cycles(v, wave),
                 f"phase_{wave}rad": float(np.arctan2(b, a)),
             }
     return given
@@ -148,7 +183,7 @@ class MotorCogging(Term):
     )
     cycles_per_rev: float = parameter(
         unit="-",
-        bounds=(1.0, 400.0),
+        bounds=(0.1, 1e6),
         source="slots and poles, least common multiple",
         free=False,
         meaning="Periods of that torque in a turn of the motor.",
@@ -199,12 +234,18 @@ class MotorCogging(Term):
 
     @classmethod
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
-        """One wave of each number of cycles in a turn."""
+        """One wave of each number of cycles in a turn; of a linear motor one of a free pitch."""
+        rig = typical.rig
+        if rig is not None and rig.axis == "linear" and (rig.gear_ratio or 1.0) == 1.0:
+            return linear_motor_cogging(typical)
         return [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
-        """Amplitude and cycles of the largest wave."""
+        """Amplitude and cycles of the largest wave; of a linear motor its pitch."""
+        if f.linear:
+            pitch_mm = 2e3 * np.pi / f.figures["cycles_per_rev"]
+            return f"cogging of {f('amplitude_Nm', 'Nm')}, every {pitch_mm:.4g} mm"
         return (
             f"cogging of {f('amplitude_Nm', 'Nm')} at the motor,"
             f" {f.figures['cycles_per_rev']:.0f} times a turn"

@@ -33,7 +33,7 @@ class TypicalMagnitudes:
     commands : frozenset of str
         What drives the recordings.
     peak_current_A : float or None
-        The largest that was read.
+        The largest that was read, or else commanded.
     command : float
         Largest standard deviation of the command, in its own unit.
     relative : bool

@@ -168,13 +168,16 @@ def _bench_magnitudes(case: Case) -> TypicalMagnitudes:
 
 
 def _peak_current_A(case: Case) -> float | None:
-    """The largest current that was read and not commanded; None where there is none."""
-    seen = [
-        float(np.percentile(np.abs(r["current_A"]), 99.9))
-        for r in case.identification
-        if "current_A" in r and r.command_name != "current_A"
-    ]
-    return max(seen, default=None)
+    """The largest current that was read, or else commanded; None where there is none."""
+    for column in ("current_A", "current_command_A"):
+        seen = [
+            float(np.percentile(np.abs(r[column]), 99.9))
+            for r in case.identification
+            if column in r
+        ]
+        if seen:
+            return max(seen)
+    return None
 
 
 def _command(case: Case) -> float:

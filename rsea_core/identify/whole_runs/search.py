@@ -41,6 +41,7 @@ from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, 
 from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
 
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
+MANY_STARTS = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +73,7 @@ class _Search:
 
     own: Estimator
     plain: Estimate
+    found: Found  # by parameters alone
     laws: Sequence[Law]
     enough: float  # misfit that is as good as none
 
@@ -163,7 +165,15 @@ class _Search:
         screened = screen(self.own, self.fit, left)
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
-        return self.fitted(self.fit, _most_promising(screened))
+        return self.fitted(self.fit, _most_promising(screened) + self.of_many_starts(left))
+
+    def of_many_starts(self, laws: Sequence[Law]) -> list[Candidate]:
+        """Laws whose wave may have any length, from the one that windows show.
+
+        What whole recordings lack adds up, and a wave of almost any length follows it at first.
+        """
+        laws = [law for law in laws if len(law.starts) > MANY_STARTS]
+        return screen(self.found.base_estimator, self.found.base, laws) if laws else []
 
     def fitted(self, base: Estimate, candidates: Sequence[Candidate]) -> list[Trial]:
         """Candidates fitted beside a fit, best first."""
@@ -275,7 +285,7 @@ def with_whole_runs(found: Found, say) -> tuple[Found, Found | None]:
     found = replace(found, left_by_parameters=left)
     if not INCOMPLETE < left < np.inf:
         return found, None
-    search = _Search(own, plain, laws_of(found), _enough(left))
+    search = _Search(own, plain, found, laws_of(found), _enough(left))
     while search.left() > search.enough and len(search.taken) < WHOLE_LAWS and search.add(say):
         pass
     if search.left() <= search.enough:
