@@ -49,7 +49,7 @@ from rsea_core.identify.multistep.tracks import prepared
 
 def fitted(
     estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None, *,
-    factors: Sequence[float] = (1.0, 0.5),
+    factors: Sequence[float] = (1.0, 0.5), iterations: int = 8,
 ) -> Estimate:  # fmt: skip
     """A candidate fitted from its best size, beside what is fitted already.
 
@@ -74,7 +74,7 @@ def fitted(
         begun = short.fit(h, trials[int(np.argmin(own_costs))][1], iterations=5)
         trials.append((h, begun.x))
     costs = estimator.costs(trials)
-    return estimator.fit(h, trials[int(np.argmin(costs))][1], iterations=8)
+    return estimator.fit(h, trials[int(np.argmin(costs))][1], iterations=iterations)
 
 
 def settled(

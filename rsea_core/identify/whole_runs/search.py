@@ -42,6 +42,7 @@ from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_
 
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
 MANY_STARTS = 20
+QUICK_ITERATIONS, CLOSE_TO_BEST = 3, 0.5  # of laws that a screening puts last; of the best gain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +166,13 @@ class _Search:
         screened = screen(self.own, self.fit, left)
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
-        return self.fitted(self.fit, _most_promising(screened) + self.of_many_starts(left))
+        candidates = _most_promising(screened) + self.of_many_starts(left)
+        trials = self.fitted(self.fit, candidates)
+        least = CLOSE_TO_BEST * max((t.gain for t in trials), default=0.0)
+        others = _of_other_effects(screened, candidates)
+        quick = self.fitted(self.fit, others, iterations=QUICK_ITERATIONS)
+        near = [t.candidate for t in quick if t.gain > least]
+        return sorted(trials + self.fitted(self.fit, near), key=lambda t: -t.gain)
 
     def of_many_starts(self, laws: Sequence[Law]) -> list[Candidate]:
         """Laws whose wave may have any length, from the one that windows show.
@@ -175,11 +182,13 @@ class _Search:
         laws = [law for law in laws if len(law.starts) > MANY_STARTS]
         return screen(self.found.base_estimator, self.found.base, laws) if laws else []
 
-    def fitted(self, base: Estimate, candidates: Sequence[Candidate]) -> list[Trial]:
+    def fitted(
+        self, base: Estimate, candidates: Sequence[Candidate], iterations: int = 8
+    ) -> list[Trial]:
         """Candidates fitted beside a fit, best first."""
         found = []
         for c in candidates:
-            fit = fitted(self.own, base, c, factors=SIZES)
+            fit = fitted(self.own, base, c, factors=SIZES, iterations=iterations)
             gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
             if np.isfinite(gain) and not at_bound(self.own.problem, fit, c.law):
                 left = misfit(self.own, fit.hypothesis, fit.x)
@@ -241,6 +250,17 @@ def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
         plain = min(laws, key=lambda c: count_values(c.law))
         found += laws[:WHOLE_FORMS] + ([] if plain in laws[:WHOLE_FORMS] else [plain])
     return found[:WHOLE_TRIED]
+
+
+def _of_other_effects(screened: Sequence[Candidate], tried: Sequence[Candidate]) -> list[Candidate]:
+    """The best candidate of each effect and reading that is not tried: what parameters that are
+    far off have taken up is not in the columns of a screening.
+    """
+    have = {(c.law.effect, c.law.sensor) for c in tried}
+    best: dict[tuple, Candidate] = {}
+    for c in sorted(screened, key=lambda c: -c.gain):
+        best.setdefault((c.law.effect, c.law.sensor), c)
+    return [c for group, c in best.items() if group not in have]
 
 
 def holds(law: Law, plainer: Law) -> bool:
