@@ -58,7 +58,7 @@ def _further(what: str, wave: int):
         return parameter(
             0.0,
             unit="Nm (motor side)",
-            bounds=(0.0, 1.0),
+            bounds=(0.0, 1e9),
             source="10-40 % of the first; a fit",
             meaning=f"Amplitude of the {which} wave of that torque.",
         )
@@ -184,9 +184,9 @@ class MotorCogging(Term):
     cycles_per_rev: float = parameter(
         unit="-",
         bounds=(0.1, 1e6),
-        source="slots and poles, least common multiple",
+        source="slots and poles, least common multiple; of a linear motor 2 pi over its pitch",
         free=False,
-        meaning="Periods of that torque in a turn of the motor.",
+        meaning="Periods of that torque in a turn of the motor; of a linear motor in 2 pi m.",
     )
     phase_rad: float = parameter(
         0.0,

@@ -21,6 +21,7 @@ from rsea_core.identify.law_search.richer_laws import begun_with
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.criteria import (
+    CLOSE_TO_BEST,
     COMPLETE,
     COMPLETE_SHARE,
     DOUBT,
@@ -28,8 +29,10 @@ from rsea_core.identify.multistep.criteria import (
     INCOMPLETE,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
+    MANY_STARTS,
     PER_VALUE,
     PULSES,
+    QUICK_ITERATIONS,
     RIVAL_SCALE,
     WHOLE_FORMS,
     WHOLE_LAWS,
@@ -41,8 +44,6 @@ from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, 
 from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
 
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
-MANY_STARTS = 20
-QUICK_ITERATIONS, CLOSE_TO_BEST = 3, 0.5  # of laws that a screening puts last; of the best gain
 
 
 @dataclass(frozen=True, kw_only=True)
