@@ -236,7 +236,8 @@ class MotorCogging(Term):
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """One wave of each number of cycles in a turn; of a linear motor one of a free pitch."""
         rig = typical.rig
-        if rig is not None and rig.axis == "linear" and (rig.gear_ratio or 1.0) == 1.0:
+        direct = rig is not None and rig.axis == "linear" and (rig.gear_ratio or 1.0) == 1.0
+        if direct and typical.relative:
             return linear_motor_cogging(typical)
         return [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
 
