@@ -18,7 +18,7 @@ from rsea_core.identify.law_search.hold_out import with_moving_loads
 from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
 from rsea_core.identify.multistep.criteria import DOUBTED_ERROR, DOUBTED_SHARE, TIMING_SHARE
 from rsea_core.identify.multistep.horizons import likelier, relative_error, with_better_timing
-from rsea_core.identify.whole_runs.search import confirmed_by_whole_runs, with_whole_runs
+from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
 from rsea_core.recordings.case import Case
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.sensor_delay import SensorDelay
+from rsea_core.effects.sensor_drift import SensorDrift
 from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.effects.sensor_scale import SensorScale
@@ -174,7 +175,8 @@ def _observable(law: Law, estimator: Estimator) -> bool:
     """Whether the readings can show a law of a sensor: two of them tell which one is late.
 
     One angle alone shows no offset: it is an angle of gravity, or none at all. One reading alone
-    shows no scale factor where the torque constant is free: either one multiplies the motion.
+    shows no scale factor where the torque constant is free: either one multiplies the motion; and
+    no drift: a slow torque moves the machine as the reading would.
     """
     single = all(len(t.experiment.channels) == 1 for t in estimator.tracks)
     angles = max(_angles(t.experiment) for t in estimator.tracks)
@@ -182,6 +184,7 @@ def _observable(law: Law, estimator: Estimator) -> bool:
     unseen = {
         SensorOffset: law.sensor in ANGLES and angles < 2,
         SensorDelay: single,
+        SensorDrift: single,
         SensorScale: single and constant,
     }
     return not unseen.get(law.kind, False)

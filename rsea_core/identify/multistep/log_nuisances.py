@@ -24,6 +24,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
 OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
+OF_FULL_SCALE = 0.2  # smallest span of commands, for that offset
 DELAY_PRIOR_ROWS = 1.0
 SERVO_DELAY_ROWS = 5.0  # a goal passes a bus and the servo's own cycle
 LONGEST_DELAY_ROWS = 60.0
@@ -47,9 +48,10 @@ def nuisances(case: Case) -> tuple[Law, ...]:
         return (*clocks[1:], *lags)
     servo = any(r.command_name == POSITION_COMMAND for r in driven)
     span = max(_span(r) for r in driven)
+    # the offset of an amplifier is one of its range, however small its commands are
+    full = OF_FULL_SCALE * (_full_scale(driven[0].command_name, case.rig) or 0.0)
     row = max(r.sample_time_s for r in driven)
-    if span == 0.0:  # an amplifier that is on has an offset at a command of zero too
-        full = _full_scale(driven[0].command_name, case.rig)
+    if span == 0.0:
         offsets = (DriveOffset.nuisance(full, OFFSET_PRIOR),) if full else ()
         return (*offsets, *clocks[1:], *lags)
     delay = Unknown(
@@ -65,7 +67,7 @@ def nuisances(case: Case) -> tuple[Law, ...]:
         effect=DriveDelay.effect, law="dead time", subsystem="drive", kind=DriveDelay,
         write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((start,),), nuisance=True,
     )  # fmt: skip
-    return (DriveOffset.nuisance(span, OFFSET_PRIOR), late, *clocks, *lags)
+    return (DriveOffset.nuisance(max(span, full), OFFSET_PRIOR), late, *clocks, *lags)
 
 
 def _span(r: Recording) -> float:

@@ -15,18 +15,13 @@ from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
-from rsea_core.identify.law_search.found import Found, Step
+from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.richer_laws import begun_with
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen
-from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.criteria import (
     CLOSE_TO_BEST,
-    COMPLETE,
-    COMPLETE_SHARE,
     DOUBT,
-    EXPLAINED,
-    INCOMPLETE,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     MANY_STARTS,
@@ -35,12 +30,11 @@ from rsea_core.identify.multistep.criteria import (
     QUICK_ITERATIONS,
     RIVAL_SCALE,
     WHOLE_FORMS,
-    WHOLE_LAWS,
     WHOLE_RIVALS,
     WHOLE_TRIED,
 )
-from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
-from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.whole_runs.sensor_noise import excess, misfit
 from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
 
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
@@ -70,7 +64,7 @@ class Trial:
 
 
 @dataclass
-class _Search:
+class WholeSearch:
     """Laws taken so far, and what each was compared with."""
 
     own: Estimator
@@ -212,7 +206,7 @@ class _Search:
             if len(self.taken) > 1:  # they were fitted beside other laws
                 others = {(w.effect, w.sensor) for w in self.taken if w is not law}
                 near = [
-                    t.candidate for t in _best_of_each_effect(trials)
+                    t.candidate for t in best_of_each_effect(trials)
                     if (t.law.effect, t.law.sensor) not in others
                 ]  # fmt: skip
                 trials = self.fitted(without(self.own, self.fit, law), near[:WHOLE_RIVALS])
@@ -271,7 +265,7 @@ def holds(law: Law, plainer: Law) -> bool:
     return same and fewer < names
 
 
-def _best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
+def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
     """The best trial of each effect and reading, best first."""
     found: dict[tuple, Trial] = {}
     for t in trials:
@@ -288,105 +282,3 @@ def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     return min(
         alike, key=lambda t: (t.law.effect == DriveDeadZone.effect, count_values(t.law), -t.gain)
     )
-
-
-def with_whole_runs(found: Found, say) -> tuple[Found, Found | None]:
-    """What was found, or the laws that leave nothing but the sensors' noise of whole recordings.
-
-    Returns
-    -------
-    Found
-    Found or None
-        Where none does: the one law that leaves little more, for where windows show nothing.
-    """
-    own = in_sensor_noise(found.base_estimator)
-    plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
-    left = misfit(own, plain.hypothesis, plain.x)
-    say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
-    found = replace(found, left_by_parameters=left)
-    if not INCOMPLETE < left < np.inf:
-        return found, None
-    search = _Search(own, plain, found, laws_of(found), _enough(left))
-    while search.left() > search.enough and len(search.taken) < WHOLE_LAWS and search.add(say):
-        pass
-    if search.left() <= search.enough:
-        search.prune(say)
-        search.compare(say)
-        search.predict(say)
-        if search.complete(found):
-            return _complete(found, search), None
-    return found, _nearly_complete(found, search, say)
-
-
-def _nearly_complete(found: Found, search: _Search, say) -> Found | None:
-    """The first law that alone explains most of what parameters leave, of rows unseen too."""
-    own, plain = search.own, search.plain
-    excess_before = excess(own, plain.hypothesis, plain.x)
-    for trial in search.first:
-        explained = 1.0 - excess(own, trial.fit.hypothesis, trial.fit.x) / excess_before
-        if explained < EXPLAINED:
-            continue
-        predicts, ratio = needed(own, trial.fit, trial.law, plain)
-        if predicts and predicts_unseen(found, own, trial.fit, plain, 1.0 - EXPLAINED):
-            say(f"  whole recordings: {trial.law.key} explains {explained:.2f} of what is left")
-            search.fit, search.taken = trial.fit, [trial.law]
-            search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
-            return replace(_complete(found, search), explained=explained)
-    return None
-
-
-def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
-    """What windows showed, marked as complete if it leaves as little of whole recordings.
-
-    Parameters
-    ----------
-    nearly : Found or None
-        What stands instead where windows showed nothing, or what leaves more.
-    """
-    if not INCOMPLETE < found.left_by_parameters < np.inf:
-        return found
-    own, h = in_sensor_noise(found.base_estimator), found.best.hypothesis
-    fit = own.fit(h, found.best.x, iterations=12)
-    left = misfit(own, h, fit.x) if found.steps else np.inf
-    laws = [step.law for step in found.steps]
-    if nearly is not None:
-        best = nearly.best
-        # a torque that acts once can follow what a law leaves once: as much is not enough of it
-        once = all(law.effect == LoadDisturbance.effect for law in laws)
-        share = 1.0 / LEFT_OF_EACH if once else LEFT_OF_EACH
-        if misfit(own, best.hypothesis, best.x) < share * left:
-            return nearly
-    if not found.steps:
-        return found
-    say(f"whole recordings: what windows showed leaves {left:.2f}")
-    complete = left <= _enough(found.left_by_parameters) and all(
-        needed(own, fit, law, without(own, fit, law))[0] for law in laws
-    )
-    return replace(found, complete=complete)
-
-
-def _enough(left: float) -> float:
-    """Misfit that is as good as none, by what parameters alone leave."""
-    return max(COMPLETE, COMPLETE_SHARE * left)
-
-
-def _complete(found: Found, search: _Search) -> Found:
-    """The search's laws as what was found."""
-    own, fit = search.own.having(search.own.tracks), search.fit
-    own.tempering = independent_share(own, fit.hypothesis, fit.x)
-    fit = own.fit(fit.hypothesis, fit.x, iterations=4)
-    steps = []
-    for law in search.taken:
-        alone = len(search.taken) == 1
-        less = search.plain if alone else without(search.own, search.fit, law)
-        gain = less.cost - search.fit.cost - PER_VALUE * count_values(law)
-        rivals = [t for t in _best_of_each_effect(search.rivals[law.key]) if t.law is not law]
-        steps.append(
-            Step(law=law, screened=gain, gain=gain, ratio=search.ratios[law.key],
-                 tempering=own.tempering, rivals=tuple((t.law, t.gain) for t in rivals),
-                 doubt=search.doubt())
-        )  # fmt: skip
-    return replace(
-        found, estimator=own, best=fit, steps=steps, horizon=None, base_shapes=[], shapes=[],
-        refused=None, complete=True,
-    )  # fmt: skip

@@ -39,7 +39,17 @@ def test_an_amplifier_has_an_offset_where_its_command_is_zero(tmp_path):
     still = replace(moved, columns=moved.columns | {"current_command_A": 0.0 * moved.time_s})
     offset = nuisances(axis_case(tmp_path, still, rig=axis_rig()))[0]
     assert offset.effect == DriveOffset.effect
-    assert offset.unknowns[0].high == axis_rig().current_limit_A
+    assert offset.unknowns[0].high == pytest.approx(0.2 * axis_rig().current_limit_A)
     unstated = replace(axis_rig(), current_limit_A=None)
     laws = nuisances(axis_case(tmp_path, still, rig=unstated))
     assert DriveOffset.effect not in {law.effect for law in laws}
+
+
+def test_an_offset_may_exceed_commands_that_are_small_for_the_drive(tmp_path):
+    moved = axis_recording(seed=1)
+    small = 1e-4 * moved.columns["current_command_A"]
+    quiet = replace(moved, columns=moved.columns | {"current_command_A": small})
+    highs = [nuisances(axis_case(tmp_path, r, rig=axis_rig()))[0].unknowns[0].high
+             for r in (moved, quiet)]  # fmt: skip
+    largest = float(abs(moved.columns["current_command_A"]).max())
+    assert highs == pytest.approx([largest, 0.2 * axis_rig().current_limit_A])

@@ -13,7 +13,7 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import COMPLETE, INCOMPLETE
 from rsea_core.identify.multistep.horizons import parameters_with_timing, with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
-from rsea_core.identify.whole_runs.search import confirmed_by_whole_runs, with_whole_runs
+from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
