@@ -81,7 +81,7 @@ def _further(what: str, wave: int):
 
 
 CYCLES_TRIED = tuple(range(1, 49))
-WAVES_TRIED = 60  # in the travel of a linear motor
+PERIODS_TRIED = 60  # in the travel of a linear motor
 
 
 def cogging(typical: TypicalMagnitudes, cycles: tuple[int, ...]) -> Law:
@@ -114,19 +114,19 @@ def linear_motor_cogging(typical: TypicalMagnitudes) -> list[Law]:
     first = [Unknown(name=f"{p}_Nm", unit="Nm", **size) for p in ("sin", "cos")]
     second = [Unknown(name=f"{p}_2_Nm", unit="Nm", **size) for p in ("sin", "cos")]
     pitch = Unknown(
-        name="cycles_per_rev", unit="-", low=0.5 * one_wave, high=2 * WAVES_TRIED * one_wave,
+        name="cycles_per_rev", unit="-", low=0.5 * one_wave, high=2 * PERIODS_TRIED * one_wave,
         scale=0.02 * one_wave,
     )  # fmt: skip
-    waves = np.arange(LEAST_CYCLES, WAVES_TRIED, 0.5) * one_wave
+    wave_numbers = np.arange(LEAST_CYCLES, PERIODS_TRIED, 0.5) * one_wave
     common = {
         "effect": "motor-cogging", "subsystem": "gear", "write": _write, "kind": MotorCogging,
         "parameters": _parameters,
     }  # fmt: skip
     return [
         Law(law="free pitch", unknowns=(*first, pitch), richer=("free pitch, two waves",),
-            starts=tuple((0.1 * ripple, 0.0, float(c)) for c in waves), **common),
+            starts=tuple((0.1 * ripple, 0.0, float(c)) for c in wave_numbers), **common),
         Law(law="free pitch, two waves", unknowns=(*first, pitch, *second),
-            starts=((0.1 * ripple, 0.0, float(waves[0]), 0.02 * ripple, 0.0),), **common),
+            starts=((0.1 * ripple, 0.0, float(wave_numbers[0]), 0.02 * ripple, 0.0),), **common),
     ]  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     WHOLE_LAWS,
 )
-from rsea_core.identify.multistep.estimator import independent_share
+from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect
 from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit
 from rsea_core.identify.whole_runs.unseen import needed, predicts_unseen, without
@@ -92,10 +92,28 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     if not found.steps:
         return found
     say(f"whole recordings: what windows showed leaves {left:.2f}")
-    complete = left <= _enough(found.left_by_parameters) and all(
-        needed(own, fit, law, without(own, fit, law))[0] for law in laws
+    enough = _enough(found.left_by_parameters)
+    if left <= enough:
+        found, fit = _without_needless(found, own, fit, enough, say)
+    complete = left <= enough and all(
+        needed(own, fit, step.law, without(own, fit, step.law))[0] for step in found.steps
     )
     return replace(found, complete=complete)
+
+
+def _without_needless(
+    found: Found, own: Estimator, fit: Estimate, enough: float, say
+) -> tuple[Found, Estimate]:
+    """The search and its fit of whole recordings, without laws that leave as little if removed."""
+    for step in reversed(found.steps):
+        less = without(own, fit, step.law)
+        if len(found.steps) > 1 and misfit(own, less.hypothesis, less.x) <= enough:
+            say(f"  whole recordings: {step.law.key} is needless")
+            fit = less
+            best = found.estimator.fit(less.hypothesis, less.x, iterations=8)
+            steps = [other for other in found.steps if other is not step]
+            found = replace(found, best=best, steps=steps)
+    return found, fit
 
 
 def _enough(left: float) -> float:

@@ -40,9 +40,9 @@ def test_only_a_linear_motor_without_a_gear_has_a_free_pitch(case):
 
 def test_starts_are_half_a_wave_apart_in_the_travel(case):
     typical = own_magnitudes(case)
-    waves = np.array([start[2] for start in linear_motor_cogging(typical)[0].starts])
+    wave_numbers = np.array([start[2] for start in linear_motor_cogging(typical)[0].starts])
     travel = 3.0 * typical.angle_rad
-    assert np.diff(waves) == pytest.approx(np.pi / travel, rel=1e-9)
+    assert np.diff(wave_numbers) == pytest.approx(np.pi / travel, rel=1e-9)
 
 
 def test_the_second_wave_has_half_the_pitch_of_the_first(case):

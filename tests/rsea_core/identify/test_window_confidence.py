@@ -18,11 +18,12 @@ def law(kind, sensor=None):
     return SimpleNamespace(effect=kind.effect, sensor=sensor)
 
 
-def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0, doubt=None, complete=False):
+def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0, doubt=None, complete=False,
+          explained=1.0):  # fmt: skip
     step = SimpleNamespace(law=taken, gain=gain, ratio=ratio, tempering=tempering, rivals=rivals,
                            doubt=doubt)  # fmt: skip
     problem = SimpleNamespace(case=SimpleNamespace(rig=Rig.preset("rsea-bench")))
-    return SimpleNamespace(steps=[step], problem=problem, complete=complete)
+    return SimpleNamespace(steps=[step], problem=problem, complete=complete, explained=explained)
 
 
 @pytest.fixture(autouse=True)
@@ -48,6 +49,11 @@ def test_laws_that_leave_only_the_sensors_noise_are_judged_by_their_rivals_alone
     doubtful = found(law(GearFriction), rival, doubt=10.0, **weak)
     assert step_confidence(doubtful, 0, None) == pytest.approx(1.0 / (1.0 + np.exp(-1.0)))
     assert step_confidence(sure, 0, HeldOut(gain=-1.0)) < 0.5
+
+
+def test_a_law_that_is_nearly_all_is_as_probable_as_the_share_that_it_explains():
+    nearly = found(law(GearFriction), complete=True, explained=0.88)
+    assert step_confidence(nearly, 0, None) == pytest.approx(0.88)
 
 
 def test_the_same_effect_in_another_reading_is_no_rival():
