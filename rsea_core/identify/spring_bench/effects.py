@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtr
 
 from rsea_core.effects.sensor_delay import SensorDelay
+from rsea_core.effects.spring_contact import SpringContact
 from rsea_core.effects.spring_hardening import SpringHardening
 from rsea_core.effects.spring_hysteresis import SpringHysteresis
 from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
@@ -21,6 +22,8 @@ from rsea_core.identify.spring_bench.regression import (
     ASYMMETRY,
     CONTACT,
     HARDENING,
+    KNEE,
+    KNEES,
     SLIP,
 )
 
@@ -67,6 +70,10 @@ def _figures_by_name(
             energy += 2.0 * c * bench.stiffness * at**2
         elif column.piece == HARDENING:
             stiffness_ratio += 3.0 * c * at**2 / flank
+        elif column.piece in (KNEE, KNEES):
+            onset = column.parameters["onset_rad"]
+            found["onset_rad"] = (abs(onset), "rad")
+            found["onset_Nm"] = (flank * abs(onset), "Nm")
         elif column.piece == ASYMMETRY:
             stiffness_ratio += 2.0 * c * at / flank
         elif c < 0.0:
@@ -122,6 +129,7 @@ def effects_of(
     for piece in candidate.pieces if pieces is None else pieces:
         name = {SLIP: SpringHysteresis.effect, CONTACT: SpringHysteresis.effect}.get(piece)
         name = name or (SpringHardening.effect if piece in (HARDENING, ASYMMETRY) else None)
+        name = name or (SpringContact.effect if piece in (KNEE, KNEES) else None)
         if name is None:
             late = candidate.parameters["lag_coefficient"] < 0.0
             name = SensorDelay.effect if late else SpringViscoelastic.effect

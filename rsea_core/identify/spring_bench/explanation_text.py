@@ -1,11 +1,14 @@
 """What a spring's explanation says, as text."""
 
+import numpy as np
+
 from rsea_core.identify.spring_bench.candidate import SpringCandidate
 from rsea_core.identify.spring_bench.file_checks import (
     is_other_unit,
 )
 from rsea_core.identify.spring_bench.regression import (
     ASYMMETRY,
+    KNEE,
     LAG,
     SLIP,
 )
@@ -17,6 +20,7 @@ PHRASES = {
     "hardening": "its stiffness varies differently with deflection",
     "asymmetry": "it is stiffer in one direction than in the other",
     "one side": "its stiffness changes with deflection",
+    "knee both ways": "its coils touch beyond a deflection in both directions",
     "contact friction": "friction between its coils grows with the torque",
 }
 
@@ -59,6 +63,9 @@ def phrase_of(best: SpringCandidate, piece: str) -> str:
         return (
             "its torque is read with a delay" if late else "it is stiffer the faster it is turned"
         )
+    if piece == KNEE:
+        onset = best.parameters["knee_onset_rad"]
+        return f"its coils touch beyond {np.degrees(onset):.3g} degrees"
     if piece == ASYMMETRY and best.parameters["other_way"] < ONE_SIDED:
         return PHRASES["one side"]
     return PHRASES[piece]

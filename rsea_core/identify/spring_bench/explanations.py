@@ -29,13 +29,15 @@ from rsea_core.identify.spring_bench.loops import (
 )
 from rsea_core.identify.spring_bench.regression import (
     ASYMMETRY,
-    LAG,
+    CONTACT,
+    FINE,
+    KNEE,
+    KNEES,
     PIECES,
     SLIP,
     Bench,
     Fit,
     offset_of,
-    stop,
     zero_of,
 )
 from rsea_core.machine.rig import Rig
@@ -53,7 +55,9 @@ APART, CLEARLY = 1.15, 1.3  # factors of stiffness and error: recordings are not
 LARGE = 0.15  # of the largest torque: smaller recordings do not show a stiffness well
 OTHER_SPRING = 2.0  # factor between stiffnesses beyond which a recording is of another spring
 
-__all__ = ("SpringCandidate", "SpringDiagnosis", "diagnose_spring", "stop")
+TOUCHING = {CONTACT, KNEE, KNEES}
+
+__all__ = ("SpringCandidate", "SpringDiagnosis", "diagnose_spring")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,6 +186,8 @@ def _search(bench: Bench) -> tuple[Bench, list[Fit]]:
             most = 2 if piece == SLIP else 1
             if not bench.can(piece) or current.pieces.count(piece) >= most:
                 continue
+            if piece in TOUCHING and TOUCHING & set(current.pieces):
+                continue  # the coils touch already
             fit = bench.fit(tuple(sorted((*current.pieces, piece))))
             tried.append(fit)
             if _is_better(bench, current, fit):
@@ -189,7 +195,7 @@ def _search(bench: Bench) -> tuple[Bench, list[Fit]]:
         if not found:
             break
         current = min(found, key=lambda fit: fit.error)
-        if {SLIP, LAG} & set(current.pieces):
+        if set(FINE) & set(current.pieces):
             bench, current = bench.refined(current)
     tried = [fit for fit in tried if fit.pieces != current.pieces and np.isfinite(fit.error)]
     return bench, [*tried, current]

@@ -17,8 +17,11 @@ from rsea_core.identify.spring_bench.regression import (
     ASYMMETRY,
     CONTACT,
     HARDENING,
+    KNEE,
+    KNEES,
     LAG,
     SLIP,
+    beyond,
     zero_of,
 )
 from rsea_core.machine.rig import Rig
@@ -75,7 +78,7 @@ def spring_model(
                 add("the relaxation", lambda branch=branch: SpringViscoelastic(**branch))
     if sliders:
         add("the sliding", lambda: SpringHysteresis(**sliders))
-    if design is not None or {HARDENING, ASYMMETRY} & set(best.pieces):
+    if design is not None or {HARDENING, ASYMMETRY, KNEE, KNEES} & set(best.pieces):
         add("the curved elastic law", lambda: _elastic(found, design))
     stiffness = max(parallel, RIGID * flank) if sliders else flank
     return (
@@ -97,7 +100,10 @@ def _elastic(found: SpringDiagnosis, design: SpringCurve | None) -> SpringCurve:
     deflection = np.union1d(np.linspace(*ends, POINTS), [0.0])
     torque = float(best.fit.coefficients[0]) * spring_torque_Nm(bench.table, deflection)
     for j, c in zip(best.fit.columns[1:], best.fit.coefficients[1:], strict=True):
-        power = {HARDENING: 3, ASYMMETRY: 2}.get(bench.columns[j].piece)
+        column = bench.columns[j]
+        if column.piece in (KNEE, KNEES):
+            torque = torque + float(c) * beyond(deflection, column)
+        power = {HARDENING: 3, ASYMMETRY: 2}.get(column.piece)
         torque = torque + (0.0 if power is None else float(c) * deflection**power)
     if SLIP in best.pieces:
         torque = torque + RIGID * best.scale * bench.stiffness * deflection

@@ -7,6 +7,7 @@
                                     or a spring that relaxes (c > 0: a Maxwell branch of H)
            + c d^3                  hardening
            + c d^2                  asymmetry: K differs between the two directions
+           + c (d - o)+             coils that touch beyond an onset o, in one direction or both
 
 The columns of all explanations are made once; any choice of them is then a small least-squares
 problem on sums over rows, every recording with an offset of its own. An explanation is judged by
@@ -20,11 +21,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations, product
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.identify.spring_bench.loops import BenchRows
+from rsea_core.identify.spring_bench.memory_columns import fading, stop
 from rsea_core.identify.spring_bench.normal_equations import (
     Sums,
     error_of,
@@ -34,15 +35,18 @@ from rsea_core.identify.spring_bench.normal_equations import (
 )
 from rsea_core.machine.spring_table import SpringTable, spring_torque_Nm
 
-SLIP, CONTACT, LAG, HARDENING, ASYMMETRY = (
-    "slip", "contact friction", "lag", "hardening", "asymmetry",
+SLIP, CONTACT, LAG, HARDENING, ASYMMETRY, KNEE, KNEES = (
+    "slip", "contact friction", "lag", "hardening", "asymmetry", "knee", "knee both ways",
 )  # fmt: skip
-PIECES = (LAG, HARDENING, ASYMMETRY, SLIP, CONTACT)
+PIECES = (LAG, HARDENING, ASYMMETRY, KNEE, KNEES, SLIP, CONTACT)
+ONSETS = np.linspace(0.15, 0.9, 16)  # of the largest deflection in a direction
 REACHES = np.geomspace(0.01, 1.2, 48)  # of the deflection's range
 COARSE = 4  # of these for the second slider
 TIMES = np.geomspace(1.0, 1000.0, 10)  # of the time between rows
 FOLDS = 4  # of a recording, each in turn predicted from the rest
+ONSET = ("onset_rad", (np.geomspace(0.95, 1.05, 9), np.geomspace(0.99, 1.01, 9)))
 FINE = {  # factors on a value that was found, and on the best of these
+    KNEE: ONSET, KNEES: ONSET,
     SLIP: ("reach_rad", (np.geomspace(0.9, 1.1, 9), np.geomspace(0.99, 1.01, 5))),
     LAG: ("time_s", (np.geomspace(0.6, 1.7, 9), np.geomspace(0.9, 1.1, 9),
                      np.geomspace(0.98, 1.02, 9))),
@@ -51,6 +55,7 @@ BLOCKS = 6  # of a recording, for standard errors
 UNLOADED = 0.05  # of the torque's range: less than this at the start is no load
 FIRST = 3  # rows that may show where a recording starts; a ramp leaves it at once
 NEEDED_SHARE = 0.02  # of a recording's rows that show its unloaded point
+ONE_WAY = 0.3  # of the larger deflection: less the other way shows no contact there
 REVERSAL = 0.01  # of the range: the turn over which contact friction changes its direction
 
 
@@ -102,39 +107,6 @@ class Fit:
         return float(self.left_out.sum()) if np.isfinite(self.in_sample) else np.inf
 
 
-@njit(cache=True, error_model="numpy")
-def stop(deflection, reach):
-    """Deflection of an elastic element in series with a slider that gives way at `reach`.
-
-    Rate-independent: the same path gives the same answer at any speed. It starts relaxed.
-    """
-    found = np.zeros(deflection.size)
-    x = 0.0
-    for row in range(1, deflection.size):
-        x += deflection[row] - deflection[row - 1]
-        if x > reach:
-            x = reach
-        elif x < -reach:
-            x = -reach
-        found[row] = x
-    return found
-
-
-@njit(cache=True, error_model="numpy")
-def fading(torque, time, tau):
-    """What is left of a torque after its low-pass of a time constant; starts at rest.
-
-    The torque goes straight from row to row, and the answer is exact for that.
-    """
-    found = np.zeros(torque.size)
-    for row in range(1, torque.size):
-        step = time[row] - time[row - 1]
-        kept = np.exp(-step / tau)
-        slope = (torque[row] - torque[row - 1]) / step
-        found[row] = kept * found[row - 1] + tau * (1.0 - kept) * slope
-    return found
-
-
 class Bench:
     """The columns of recordings and their sums.
 
@@ -175,6 +147,7 @@ class Bench:
             Column(piece=CONTACT, parameters={"onset_rad": self.onset}),
             Column(piece=HARDENING, parameters={}),
             Column(piece=ASYMMETRY, parameters={}),
+            *self._knees(),
             *(
                 Column(piece=LAG, parameters={"time_s": t * step})
                 for t in (TIMES if timed else ())
@@ -186,6 +159,18 @@ class Bench:
         self.coarse = sum(c.piece == SLIP for c in own)
         self.sums = [self._folds(r) for r in self.rows]
         self.spread = sum(float(np.sum((r.torque_Nm - r.torque_Nm.mean()) ** 2)) for r in rows)
+
+    def _knees(self) -> list[Column]:
+        """Onsets of contact, those of one direction with its sign."""
+        deflections = [r.deflection_rad - zero_of(r) for r in self.rows]
+        ends = [max(float((s * d).max()) for d in deflections) for s in (1.0, -1.0)]
+        one_way = [s * o * end for s, end in zip((1.0, -1.0), ends, strict=True) for o in ONSETS
+                   if end > ONE_WAY * max(ends)]  # fmt: skip
+        both = [o * min(ends) for o in ONSETS if min(ends) > ONE_WAY * max(ends)]
+        return [
+            Column(piece=piece, parameters={"onset_rad": float(o)})
+            for piece, onsets in ((KNEE, one_way), (KNEES, both)) for o in onsets
+        ]  # fmt: skip
 
     def matrix(self, r: BenchRows, columns: Sequence[int]) -> NDArray:
         """(rows, columns) array of a recording."""
@@ -199,6 +184,8 @@ class Bench:
             return deflection**3
         if column.piece == ASYMMETRY:
             return deflection**2
+        if column.piece in (KNEE, KNEES):
+            return beyond(deflection, column)
         elastic = spring_torque_Nm(self.table, deflection)
         if column.piece == LAG:
             return fading(elastic, r.time_s, column.parameters["time_s"])
@@ -379,6 +366,13 @@ def _near(column: Column, stage: int) -> list[Column]:
         for factors in stages[stage : stage + 1]
         for f in factors
     ]
+
+
+def beyond(deflection: NDArray, column: Column) -> NDArray:
+    """Deflection beyond the onset of a contact, with its sign."""
+    onset = column.parameters["onset_rad"]
+    ways = (1.0, -1.0) if column.piece == KNEES else (np.sign(onset),)
+    return sum(way * np.maximum(way * deflection - abs(onset), 0.0) for way in ways)
 
 
 def offset_of(r: BenchRows, error: NDArray) -> float:

@@ -12,9 +12,9 @@ from dftfs.analysis.study.actuator import spring_curve
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench.effects import figures_of
-from rsea_core.identify.spring_bench.explanations import diagnose_spring, stop
+from rsea_core.identify.spring_bench.explanations import diagnose_spring
 from rsea_core.identify.spring_bench.loops import measure_spring, turns
-from rsea_core.identify.spring_bench.regression import fading
+from rsea_core.identify.spring_bench.memory_columns import fading, stop
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.finding import Kind, sentences
@@ -150,12 +150,26 @@ def test_a_thicker_strip_is_read_from_the_scale_of_its_curve():
             lambda x, t: K * x * (1.0 + 0.15 * np.sign(x * np.gradient(x, t)) * (np.abs(x) > 0.12)),
         ),
         ("hardening", lambda x, t: K * x + 500.0 * x**3),
+        ("knee", lambda x, t: K * x + 40.0 * np.maximum(x - 0.1, 0.0)),
+        ("knee both ways",
+         lambda x, t: K * x + 40.0 * np.sign(x) * np.maximum(np.abs(x) - 0.1, 0.0)),
     ],
-)
+)  # fmt: skip
 def test_what_was_planted_is_named(name, law):
     found = diagnose_spring(BENCH, loops(law), DESIGN)
     assert found.best.name == name, [(c.name, c.error) for c in found.candidates]
     assert found.best.error < 0.04
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_coils_that_touch_in_one_direction_are_named_with_their_onset(side):
+    found = diagnose_spring(
+        BENCH, loops(lambda x, t: K * x + side * 40.0 * np.maximum(side * x - 0.1, 0.0)), DESIGN
+    )
+    figures = figures_of(found, found.best.pieces)
+    assert figures["onset_rad"]["value"] == pytest.approx(0.1, rel=0.03)
+    assert figures["onset_Nm"]["value"] == pytest.approx(0.1 * K, rel=0.03)
+    assert "its coils touch beyond" in found.sentence
 
 
 def test_a_clamp_that_slips_does_not_pass_for_a_thinner_strip():
