@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.registry import SpringCurve
+from rsea_core.identify.spring_bench.history_columns import fading, stop
 from rsea_core.identify.spring_bench.loops import BenchRows
-from rsea_core.identify.spring_bench.memory_columns import fading, stop
 from rsea_core.identify.spring_bench.normal_equations import (
     Sums,
     error_of,
@@ -55,7 +55,7 @@ BLOCKS = 6  # of a recording, for standard errors
 UNLOADED = 0.05  # of the torque's range: less than this at the start is no load
 FIRST = 3  # rows that may show where a recording starts; a ramp leaves it at once
 NEEDED_SHARE = 0.02  # of a recording's rows that show its unloaded point
-ONE_WAY = 0.3  # of the larger deflection: less the other way shows no contact there
+BOTH_DIRECTIONS = 0.3  # of the larger deflection: less the other way shows no contact there
 REVERSAL = 0.01  # of the range: the turn over which contact friction changes its direction
 
 
@@ -164,12 +164,12 @@ class Bench:
         """Onsets of contact, those of one direction with its sign."""
         deflections = [r.deflection_rad - zero_of(r) for r in self.rows]
         ends = [max(float((s * d).max()) for d in deflections) for s in (1.0, -1.0)]
-        one_way = [s * o * end for s, end in zip((1.0, -1.0), ends, strict=True) for o in ONSETS
-                   if end > ONE_WAY * max(ends)]  # fmt: skip
-        both = [o * min(ends) for o in ONSETS if min(ends) > ONE_WAY * max(ends)]
+        single = [s * o * end for s, end in zip((1.0, -1.0), ends, strict=True) for o in ONSETS
+                   if end > BOTH_DIRECTIONS * max(ends)]  # fmt: skip
+        both = [o * min(ends) for o in ONSETS if min(ends) > BOTH_DIRECTIONS * max(ends)]
         return [
             Column(piece=piece, parameters={"onset_rad": float(o)})
-            for piece, onsets in ((KNEE, one_way), (KNEES, both)) for o in onsets
+            for piece, onsets in ((KNEE, single), (KNEES, both)) for o in onsets
         ]  # fmt: skip
 
     def matrix(self, r: BenchRows, columns: Sequence[int]) -> NDArray:
@@ -371,8 +371,8 @@ def _near(column: Column, stage: int) -> list[Column]:
 def beyond(deflection: NDArray, column: Column) -> NDArray:
     """Deflection beyond the onset of a contact, with its sign."""
     onset = column.parameters["onset_rad"]
-    ways = (1.0, -1.0) if column.piece == KNEES else (np.sign(onset),)
-    return sum(way * np.maximum(way * deflection - abs(onset), 0.0) for way in ways)
+    directions = (1.0, -1.0) if column.piece == KNEES else (np.sign(onset),)
+    return sum(side * np.maximum(side * deflection - abs(onset), 0.0) for side in directions)
 
 
 def offset_of(r: BenchRows, error: NDArray) -> float:

@@ -7,7 +7,7 @@ import pytest
 
 from dftfs.cli.main import main
 from rsea_core.effects.registry import SpringCurve, SpringHysteresis
-from rsea_core.identify.spring_bench.memory_columns import stop
+from rsea_core.identify.spring_bench.history_columns import stop
 from rsea_core.model.model_file import read_model
 
 K = 65.0

@@ -13,8 +13,8 @@ from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import InputError
 from rsea_core.identify.spring_bench.effects import figures_of
 from rsea_core.identify.spring_bench.explanations import diagnose_spring
+from rsea_core.identify.spring_bench.history_columns import fading, stop
 from rsea_core.identify.spring_bench.loops import measure_spring, turns
-from rsea_core.identify.spring_bench.memory_columns import fading, stop
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.finding import Kind, sentences
