@@ -31,6 +31,7 @@ from rsea_core.identify.spring_bench.regression import (
     ASYMMETRY,
     CONTACT,
     FINE,
+    HARDENING,
     KNEE,
     KNEES,
     PIECES,
@@ -55,7 +56,11 @@ APART, CLEARLY = 1.15, 1.3  # factors of stiffness and error: recordings are not
 LARGE = 0.15  # of the largest torque: smaller recordings do not show a stiffness well
 OTHER_SPRING = 2.0  # factor between stiffnesses beyond which a recording is of another spring
 
-TOUCHING = {CONTACT, KNEE, KNEES}
+ALTERNATIVES = (  # of each group one: the coils touch once, and a knee corrects no polynomial
+    {CONTACT, KNEE, KNEES},
+    {HARDENING, KNEE, KNEES},
+    {ASYMMETRY, KNEE, KNEES},
+)
 
 __all__ = ("SpringCandidate", "SpringDiagnosis", "diagnose_spring")
 
@@ -186,8 +191,8 @@ def _search(bench: Bench) -> tuple[Bench, list[Fit]]:
             most = 2 if piece == SLIP else 1
             if not bench.can(piece) or current.pieces.count(piece) >= most:
                 continue
-            if piece in TOUCHING and TOUCHING & set(current.pieces):
-                continue  # the coils touch already
+            if any(piece in group and group & set(current.pieces) for group in ALTERNATIVES):
+                continue
             fit = bench.fit(tuple(sorted((*current.pieces, piece))))
             tried.append(fit)
             if _is_better(bench, current, fit):
@@ -218,6 +223,8 @@ def _is_better(bench: Bench, now: Fit, fit: Fit) -> bool:
 
     The sum is the largest recordings'; what acts in all of them, such as a lag, shows in each.
     """
+    if not np.isfinite(fit.error):
+        return False
     each = np.sqrt(fit.left_out.sum(axis=1) / now.left_out.sum(axis=1))
     if np.exp(np.mean(np.log(each))) < BETTER and chance(now, fit) < CHANCE:
         return True

@@ -97,7 +97,10 @@ def _elastic(found: SpringDiagnosis, design: SpringCurve | None) -> SpringCurve:
     )
     if design is not None:
         ends = float(design.deflection_rad[0]), float(design.deflection_rad[-1])
-    deflection = np.union1d(np.linspace(*ends, POINTS), [0.0])
+    knees = [bench.columns[j] for j in best.fit.columns if bench.columns[j].piece in (KNEE, KNEES)]
+    onsets = [s * k.parameters["onset_rad"] for k in knees for s in (1.0, -1.0)]
+    corners = [o for o in (0.0, *onsets) if ends[0] <= o <= ends[1]]
+    deflection = np.union1d(np.linspace(*ends, POINTS), corners)
     torque = float(best.fit.coefficients[0]) * spring_torque_Nm(bench.table, deflection)
     for j, c in zip(best.fit.columns[1:], best.fit.coefficients[1:], strict=True):
         column = bench.columns[j]

@@ -272,9 +272,10 @@ class Bench:
         )  # fmt: skip
 
     def _solve(self, choices: NDArray, left_out: tuple[int, int] | None) -> tuple[NDArray, NDArray]:
-        """Coefficients and squared errors of all choices; infinite where a slider would push.
+        """Coefficients and squared errors of all choices; infinite where a column must not be.
 
-        Beside sliders the rest of the spring may vanish, but not push either.
+        A slider may not push, and a contact may not soften the spring. Beside sliders the rest of
+        the spring may vanish, but not push either.
         """
         n = len(self.columns)
         gram, right, whole = np.zeros((n, n)), np.zeros(n), 0.0
@@ -293,7 +294,8 @@ class Bench:
             without, left = least_squares(gram, right, whole, choices[alone][:, 1:])
             solved[alone] = np.column_stack([np.zeros(alone.sum()), without])
             squares[alone] = left
-        negative = np.any(slides_of & (solved < 0.0), axis=1)
+        stiffens_of = np.array([c.piece in (SLIP, KNEE, KNEES) for c in self.columns])[choices]
+        negative = np.any(stiffens_of & (solved < 0.0), axis=1)
         return solved, np.where(negative, np.inf, squares)
 
     # ---- what a fit says

@@ -46,7 +46,7 @@ def with_whole_runs(found: Found, say) -> tuple[Found, Found | None]:
         search.prune(say)
         search.compare(say)
         search.predict(say)
-        if search.complete(found):
+        if search.complete(say):
             return _complete(found, search), None
     return found, _nearly_complete(found, search, say)
 
@@ -55,12 +55,14 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
     """The first law that alone explains most of what parameters leave, of rows unseen too."""
     own, plain = search.own, search.plain
     excess_before = excess(own, plain.hypothesis, plain.x)
+    if excess_before == 0.0:  # one reading is not predicted, and others better than their noise
+        return None
     for trial in search.first:
         explained = 1.0 - excess(own, trial.fit.hypothesis, trial.fit.x) / excess_before
         if explained < EXPLAINED:
             continue
         predicts, ratio = needed(own, trial.fit, trial.law, plain)
-        if predicts and predicts_unseen(found, own, trial.fit, plain, 1.0 - EXPLAINED):
+        if predicts and predicts_unseen(found, own, trial.fit, plain, say, 1.0 - EXPLAINED):
             say(f"  whole recordings: {trial.law.key} explains {explained:.2f} of what is left")
             search.fit, search.taken = trial.fit, [trial.law]
             search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
@@ -84,7 +86,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     laws = [step.law for step in found.steps]
     if nearly is not None:
         best = nearly.best
-        # a torque that acts once can follow what a law leaves once: as much is not enough of it
+        # a torque that acts once is flexible: it must leave clearly less than a lasting law
         once = all(law.effect == LoadDisturbance.effect for law in laws)
         share = 1.0 / LEFT_OF_EACH if once else LEFT_OF_EACH
         if misfit(own, best.hypothesis, best.x) < share * left:

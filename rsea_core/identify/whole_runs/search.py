@@ -170,9 +170,9 @@ class WholeSearch:
         return sorted(trials + self.fitted(self.fit, near), key=lambda t: -t.gain)
 
     def of_many_starts(self, laws: Sequence[Law]) -> list[Candidate]:
-        """Laws whose wave may have any length, from the one that windows show.
+        """Laws whose wave may have any length, begun at the length that windows show.
 
-        What whole recordings lack adds up, and a wave of almost any length follows it at first.
+        Errors of whole recordings accumulate, so that a wave of almost any length lowers them.
         """
         laws = [law for law in laws if len(law.starts) > MANY_STARTS]
         return screen(self.found.base_estimator, self.found.base, laws) if laws else []
@@ -229,10 +229,10 @@ class WholeSearch:
                 self.fit = less
                 self.taken.remove(law)
 
-    def complete(self, found: Found) -> bool:
+    def complete(self, say) -> bool:
         """Whether the laws leave nothing but noise, and predict rows unseen."""
         enough = bool(self.taken) and self.left() <= self.enough
-        return enough and predicts_unseen(found, self.own, self.fit, self.plain)
+        return enough and predicts_unseen(self.found, self.own, self.fit, self.plain, say)
 
 
 def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
@@ -248,8 +248,9 @@ def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
 
 
 def _of_other_effects(screened: Sequence[Candidate], tried: Sequence[Candidate]) -> list[Candidate]:
-    """The best candidate of each effect and reading that is not tried: what parameters that are
-    far off have taken up is not in the columns of a screening.
+    """The best candidate of each effect and reading that is not tried.
+
+    A screening about parameters that are far off does not show what these have taken up.
     """
     have = {(c.law.effect, c.law.sensor) for c in tried}
     best: dict[tuple, Candidate] = {}

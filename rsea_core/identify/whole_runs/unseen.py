@@ -23,7 +23,7 @@ from rsea_core.identify.multistep.kalman_filter import huber_squares
 
 
 def predicts_unseen(
-    found: Found, own: Estimator, fit: Estimate, plain: Estimate, most: float = UNPREDICTED
+    found: Found, own: Estimator, fit: Estimate, plain: Estimate, say, most: float = UNPREDICTED
 ) -> bool:
     """Whether a fit predicts rows that it was not made of, by most of what parameters alone leave.
 
@@ -40,7 +40,9 @@ def predicts_unseen(
     most : float
         Share of what they leave of the unseen rows, that the fit may leave.
     """
-    if _left_unseen(own, fit) >= most * _left_unseen(own, plain):
+    share = _left_unseen(own, fit) / _left_unseen(own, plain)
+    say(f"  whole recordings: of rows unseen {share:.2f} of what parameters leave remains")
+    if share >= most:
         return False
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
     if not unseen:
@@ -88,7 +90,11 @@ def other_values(own: Estimator, fit: Estimate, law: Law) -> NDArray:
 
 
 def _left_unseen(own: Estimator, fit: Estimate) -> float:
-    """Cost of the rows after the first ones, to which alone the fit is made once more."""
+    """Cost of the rows after the first ones, to which alone the fit is made once more.
+
+    It begins at the values found in all rows: those that the first rows do not show (a torque that
+    acts later) stay as they were, and are not tested.
+    """
     first = own.having([replace(t, seen=FITTED_ROWS) for t in own.tracks])
     x = first.fit(fit.hypothesis, fit.x, iterations=8).x
     return _cost(own, fit.hypothesis, x) - _cost(first, fit.hypothesis, x)

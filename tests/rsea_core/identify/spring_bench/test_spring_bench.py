@@ -172,6 +172,13 @@ def test_coils_that_touch_in_one_direction_are_named_with_their_onset(side):
     assert "its coils touch beyond" in found.sentence
 
 
+def test_a_spring_that_softens_beyond_a_deflection_has_no_contact():
+    found = diagnose_spring(
+        BENCH, loops(lambda x, t: K * x - 20.0 * np.maximum(x - 0.1, 0.0)), DESIGN
+    )
+    assert not any("knee" in piece for piece in found.best.pieces)
+
+
 def test_a_clamp_that_slips_does_not_pass_for_a_thinner_strip():
     found = diagnose_spring(BENCH, loops(slipping), DESIGN)
     plain = next(c for c in found.candidates if c.name == "scale")

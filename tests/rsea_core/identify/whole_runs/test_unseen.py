@@ -50,13 +50,13 @@ def test_a_law_of_the_machine_predicts_unseen_rows_evenly(sprung, true_law):
     predicts, ratio = needed(own, true_law, true_law.hypothesis.laws[-1], plain)
     assert predicts
     assert ratio > 10.0
-    assert predicts_unseen(found, own, true_law, plain, 0.05)
+    assert predicts_unseen(found, own, true_law, plain, lambda text: None, 0.05)
 
 
 def test_a_torque_that_acts_once_does_not_predict_what_a_spring_does(sprung, pulse):
     found, own, plain = sprung
     assert pulse.cost < plain.cost - 100.0  # as a fit, it is worth much
-    assert not predicts_unseen(found, own, pulse, plain, 0.3)
+    assert not predicts_unseen(found, own, pulse, plain, lambda text: None, 0.3)
 
 
 def test_a_fit_without_a_law_is_that_of_the_others(sprung, true_law):
