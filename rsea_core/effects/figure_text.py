@@ -1,5 +1,6 @@
 """Reported figures as text: values with units that somebody of the field reads at once."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -18,7 +19,17 @@ READINGS = {
 }
 SCALED = ((1e-9, 1e-4, 1e6, "µ"), (1e-4, 0.1, 1e3, "m"))
 PREFIXED = ("Nm", "rad", "N", "m", "s", "A", "J")
-LINEAR = {"Nm": "N", "rad": "m", "Nm/rad": "N/m", "Nm/rad^3": "N/m^3"}
+LINEAR = {"Nm": "N", "Nms": "Ns", "rad": "m", "kgm2": "kg", "kg m2": "kg"}
+_ANGULAR = re.compile(r"\b(?:Nms?|rad|kg ?m2)\b")
+
+
+def linear_units(text: str) -> str:
+    """A text with the units of a linear machine, which is written with 1 m as 1 rad.
+
+    >>> linear_units("torque (Nm), stiffness (Nm/rad)")
+    'torque (N), stiffness (N/m)'
+    """
+    return _ANGULAR.sub(lambda found: LINEAR[found[0]], text)
 
 
 def amount(value: float, unit: str, *, linear: bool = False) -> str:
@@ -29,7 +40,7 @@ def amount(value: float, unit: str, *, linear: bool = False) -> str:
     linear : bool
         Whether the machine is written with 1 m as 1 rad and 1 N as 1 Nm.
     """
-    unit = LINEAR.get(unit, unit) if linear else unit
+    unit = linear_units(unit) if linear else unit
     if unit in PREFIXED:
         for least, below, factor, prefix in SCALED:
             if least <= abs(value) < below * (1.0 - 1e-9):

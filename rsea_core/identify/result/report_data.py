@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.figure_text import linear_units
 from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.registry import LAWS
@@ -96,7 +97,17 @@ def report_data(
             "shares": {place: conclusion.residual.share},
             "traces": _unknown(conclusion.residual),
         }
-    return found
+    return _in_linear_units(found) if rig.axis == "linear" else found
+
+
+def _in_linear_units(page: Any, key: str = "") -> Any:
+    """The page with metres and newtons as units and in the labels of axes."""
+    if isinstance(page, dict):
+        return {name: _in_linear_units(value, name) for name, value in page.items()}
+    if isinstance(page, (list, tuple)):
+        return type(page)(_in_linear_units(value, key) for value in page)
+    is_unit = isinstance(page, str) and (key == "unit" or key.endswith("label"))
+    return linear_units(page) if is_unit else page
 
 
 def _is_mapped(conclusion: Conclusion, verdict: str, place: str | None) -> bool:

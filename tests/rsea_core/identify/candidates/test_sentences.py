@@ -20,6 +20,7 @@ from tests.cases.planted import planted
         (22.09, "Nm", True, "22.1 N"),
         (0.002, "rad", True, "2 mm"),
         (1.16, "Nm/rad", True, "1.16 N/m"),
+        (0.3, "Nms/rad", True, "0.3 Ns/m"),
         (0.0, "A", False, "0 A"),
         (-0.02, "s", False, "-20 ms"),
         (3.3, "ohm", False, "3.3 ohm"),

@@ -1,6 +1,7 @@
 """A diagnosis of recordings holds all that its report needs."""
 
-from dataclasses import asdict
+from copy import copy
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -131,3 +132,14 @@ def test_the_law_found_is_drawn_with_a_band_that_holds_the_truth(diagnosis, show
     assert np.all(law["low"] <= law["found"])
     assert np.all(law["found"] <= law["high"])
     assert np.all(law["nominal"][fast] < 0.5 * law["found"][fast])
+
+
+def test_units_of_a_linear_machine_are_metres_and_newtons(diagnosis):
+    conclusion = copy(diagnosis.conclusion)
+    case = conclusion.case
+    conclusion.case = replace(case, rig=replace(case.rig, axis="linear"))
+    page = report_data(replace(diagnosis, conclusion=conclusion), quick=True)
+    units = {row["unit"] for row in page["comparisons"] + page["scores"] + page["parameters"]}
+    assert {"N", "A"} <= units
+    assert not any("Nm" in unit or "rad" in unit for unit in units)
+    assert all("Nm" not in law["y_label"] for law in page["laws"])
