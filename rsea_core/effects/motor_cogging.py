@@ -1,7 +1,7 @@
 """Cogging: a torque ripple that repeats with the motor angle."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -102,6 +102,15 @@ def cogging(typical: TypicalMagnitudes, cycles: tuple[int, ...]) -> Law:
     )  # fmt: skip
 
 
+def with_harmonic(law: Law) -> list[Law]:
+    """A law of one wave, and what may take its place: the same with a wave of half its length."""
+    richer = f"{law.law}, two waves"
+    second = [replace(u, name=f"{u.name[:3]}_2_Nm") for u in law.unknowns[:2]]
+    starts = tuple((*start, 0.2 * start[0], 0.0) for start in law.starts)
+    two = replace(law, law=richer, unknowns=(*law.unknowns, *second), starts=starts, follows=True)
+    return [replace(law, richer=(richer,)), two]
+
+
 def linear_motor_cogging(typical: TypicalMagnitudes) -> list[Law]:
     """Waves over the position of a linear motor, whose pitch no rig file states: it is fitted.
 
@@ -112,22 +121,16 @@ def linear_motor_cogging(typical: TypicalMagnitudes) -> list[Law]:
     ripple = 0.05 * typical.motor_torque_Nm
     size = {"low": -20 * ripple, "high": 20 * ripple, "scale": 0.2 * ripple}
     first = [Unknown(name=f"{p}_Nm", unit="Nm", **size) for p in ("sin", "cos")]
-    second = [Unknown(name=f"{p}_2_Nm", unit="Nm", **size) for p in ("sin", "cos")]
     pitch = Unknown(
         name="cycles_per_rev", unit="-", low=0.5 * one_wave, high=2 * PERIODS_TRIED * one_wave,
         scale=0.02 * one_wave,
     )  # fmt: skip
     wave_numbers = np.arange(LEAST_CYCLES, PERIODS_TRIED, 0.5) * one_wave
-    common = {
-        "effect": "motor-cogging", "subsystem": "gear", "write": _write, "kind": MotorCogging,
-        "parameters": _parameters,
-    }  # fmt: skip
-    return [
-        Law(law="free pitch", unknowns=(*first, pitch), richer=("free pitch, two waves",),
-            starts=tuple((0.1 * ripple, 0.0, float(c)) for c in wave_numbers), **common),
-        Law(law="free pitch, two waves", unknowns=(*first, pitch, *second),
-            starts=((0.1 * ripple, 0.0, float(wave_numbers[0]), 0.02 * ripple, 0.0),), **common),
-    ]  # fmt: skip
+    return with_harmonic(
+        Law(effect="motor-cogging", law="free pitch", subsystem="gear", unknowns=(*first, pitch),
+            starts=tuple((0.1 * ripple, 0.0, float(c)) for c in wave_numbers),
+            write=_write, kind=MotorCogging, parameters=_parameters)
+    )  # fmt: skip
 
 
 def _cycles(v: Values, wave: str) -> float:
@@ -239,7 +242,8 @@ class MotorCogging(Term):
         direct = rig is not None and rig.axis == "linear" and (rig.gear_ratio or 1.0) == 1.0
         if direct and typical.relative:
             return linear_motor_cogging(typical)
-        return [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
+        waves = [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
+        return [w for wave in waves for w in with_harmonic(wave)] if typical.relative else waves
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:

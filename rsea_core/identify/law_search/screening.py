@@ -7,7 +7,7 @@ fitted to (docs/diagnosis.md 10.4).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from rsea_core.identify.multistep.kalman_filter import huber_weights
 from rsea_core.identify.multistep.tracks import Track
 
 BATCH = 24  # trials predicted at once
+SMALLEST, LARGEST = 1e-3, 1e3  # size of a start that is screened again
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,7 +127,8 @@ def _block_of_each(tracks: Sequence[Track]) -> NDArray:
 
 
 def screen(estimator: Estimator, fit: Estimate, laws: Sequence[Law]) -> list[Candidate]:
-    """Candidates, the largest held-out gain first."""
+    """Candidates, the largest held-out gain first; no laws that follow another one."""
+    laws = [law for law in laws if not law.follows]
     problem, projection = estimator.problem, Projection(estimator, fit)
     n = len(problem.nominals)
     jobs = [
@@ -166,6 +168,22 @@ def screen(estimator: Estimator, fit: Estimate, laws: Sequence[Law]) -> list[Can
             if old is None or held_out > old.held_out:
                 best[law.key] = candidate
     return sorted(best.values(), key=lambda c: -c.held_out)
+
+
+def screen_again(
+    estimator: Estimator, fit: Estimate, candidates: Sequence[Candidate]
+) -> list[Candidate]:
+    """Candidates screened at the sizes that a first screening found.
+
+    A machine that turns freely answers the sizes of the first one out of proportion: it stops
+    in a well of a torque that is ten times too large, and the column says nothing of the law.
+    """
+    known = {c.law.key: c.law for c in candidates}
+    begun = [
+        replace(c.law, starts=(c.law.scaled(c.start, min(max(c.size, SMALLEST), LARGEST)),))
+        for c in candidates
+    ]
+    return [replace(c, law=known[c.law.key]) for c in screen(estimator, fit, begun)]
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:

@@ -130,7 +130,7 @@ def laws_of(found: Found) -> list[Law]:
     meshes = any(law.effect == MESH_DAMPER for law in found.base.hypothesis.laws)
     return [
         law for law in catalogue(found.problem.case, relative=True).values()
-        if law.effect not in HOLDS_NO_CLAIM and not law.follows
+        if law.effect not in HOLDS_NO_CLAIM
         and not (meshes and law.subsystem == "spring")
         and _observable(law, found.base_estimator)
     ]  # fmt: skip

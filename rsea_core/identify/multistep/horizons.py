@@ -186,7 +186,7 @@ def _grown(
         if horizon is not None and not _long_enough(estimator, horizon):
             continue
         trial = estimator.having(with_windows(estimator, horizon))
-        fit = trial.fit(h, x, iterations=5) if known else _with_best_delay(trial, h, x)
+        fit = trial.fit(h, x, iterations=5) if known else with_best_delay(trial, h, x)
         ends = [_in_own_noise(trial, fit)]
         if output_errors:
             ends.append(_from_output_error(trial, h, x, known))
@@ -200,7 +200,7 @@ def _grown(
     estimator = with_noise(estimator.having(with_windows(estimator, kept)), h, x)
     estimator = with_coloured_readings(estimator, h, x, say)
     plain = estimator.fit(h, x)
-    fit = _with_best_delay(estimator, h, plain.x)  # short windows hardly show one
+    fit = with_best_delay(estimator, h, plain.x)  # short windows hardly show one
     late = fit.cost < plain.cost - LINEAR_GAIN
     if late:
         smooth(estimator, h, fit.x)
@@ -232,12 +232,12 @@ def _from_output_error(
     """The same from a fit to whole windows."""
     for _ in range(2):  # the noise of the readings is first that of the values before
         output = with_output_error(estimator, h, x)
-        fit = output.fit(h, x, iterations=5) if known else _with_best_delay(output, h, x)
+        fit = output.fit(h, x, iterations=5) if known else with_best_delay(output, h, x)
         x = fit.x
     return _in_own_noise(output, fit)
 
 
-def _with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
+def with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
     """A fit whose delay began where the cost is lowest.
 
     A late command turns in phase: from a wrong delay a fit bends the machine's values instead.
@@ -306,12 +306,12 @@ def with_fine_steps(
 def _in_steps(estimator: Estimator, steps: EngineSteps) -> Estimator:
     """The estimator with experiments in other steps."""
     problem = estimator.problem
-    return _with_problem(
+    return with_problem(
         estimator, MultistepProblem(problem.case, timing=problem.timing, steps=steps)
     )
 
 
-def _with_problem(estimator: Estimator, problem: MultistepProblem) -> Estimator:
+def with_problem(estimator: Estimator, problem: MultistepProblem) -> Estimator:
     """The estimator with the experiments of another problem, in the same windows and noise."""
     tracks = [
         prepared(replace(t, experiment=e))
@@ -377,8 +377,8 @@ def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estim
     """
     least = -LINEAR_GAIN if timing == AS_LOGGED else LINEAR_GAIN
     h, steps = base.hypothesis, estimator.problem.steps
-    other = _with_problem(estimator, MultistepProblem(case, timing=timing, steps=steps))
-    fit = _with_best_delay(other, h, base.x)
+    other = with_problem(estimator, MultistepProblem(case, timing=timing, steps=steps))
+    fit = with_best_delay(other, h, base.x)
     better = fit.cost < base.cost - least
     if not better and fit.cost < base.cost + 50.0:
         other = with_noise(other, h, fit.x)

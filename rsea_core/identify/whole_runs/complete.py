@@ -7,7 +7,8 @@ import numpy as np
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found, Step
-from rsea_core.identify.law_search.search import laws_of
+from rsea_core.identify.law_search.search import begun, laws_of
+from rsea_core.identify.multistep.command_timing import CommandTiming, timings
 from rsea_core.identify.multistep.criteria import (
     COMPLETE,
     COMPLETE_SHARE,
@@ -18,13 +19,20 @@ from rsea_core.identify.multistep.criteria import (
     WHOLE_LAWS,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect
 from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit
 from rsea_core.identify.whole_runs.unseen import needed, predicts_unseen, without
 
 
-def with_whole_runs(found: Found, say) -> tuple[Found, Found | None]:
+def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Found | None]:
     """What was found, or the laws that leave nothing but the sensors' noise of whole recordings.
+
+    Parameters
+    ----------
+    again : bool
+        Search once more where commands act at other times with laws that are not complete.
 
     Returns
     -------
@@ -48,7 +56,29 @@ def with_whole_runs(found: Found, say) -> tuple[Found, Found | None]:
         search.predict(say)
         if search.complete(say):
             return _complete(found, search), None
-    return found, _nearly_complete(found, search, say)
+    nearly = _nearly_complete(found, search, say)
+    timing = _other_timing(search) if again and search.taken else None
+    if timing is not None:
+        say("searched again: with laws of whole recordings, commands act at other times")
+        other = begun(found.problem.case, timing, say)
+        other, its_nearly = with_whole_runs(other, say, again=False)
+        if other.complete or (its_nearly is not None and nearly is None):
+            return other, its_nearly
+    return found, nearly
+
+
+def _other_timing(search: WholeSearch) -> CommandTiming | None:
+    """Times of commands at which the laws taken predict clearly better; None where there are none.
+
+    A drag that parameters lack can make a command that moves between its rows look held.
+    """
+    own, h = search.own, search.fit.hypothesis
+    for timing in timings(own.problem.case, own.problem.timing):
+        problem = MultistepProblem(own.problem.case, timing=timing, steps=own.problem.steps)
+        other = with_best_delay(with_problem(own, problem), h, search.fit.x)
+        if other.cost < search.fit.cost - search.doubt():
+            return timing
+    return None
 
 
 def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:

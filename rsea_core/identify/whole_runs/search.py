@@ -18,13 +18,14 @@ from rsea_core.identify.law_search.candidate_fits import at_bound, count_values,
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.richer_laws import begun_with
-from rsea_core.identify.law_search.screening import Candidate, Projection, screen
+from rsea_core.identify.law_search.screening import Candidate, Projection, screen, screen_again
 from rsea_core.identify.multistep.criteria import (
     CLOSE_TO_BEST,
     DOUBT,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     MANY_STARTS,
+    NEIGHBOURS,
     PER_VALUE,
     PULSES,
     QUICK_ITERATIONS,
@@ -102,6 +103,7 @@ class WholeSearch:
         self.fit = best.fit
         self.taken.append(best.law)
         self.rivals[best.law.key] = trials
+        self.nearest_number(best.law, say)
         return True
 
     def better_form(self, gain: float, say) -> bool:
@@ -117,12 +119,42 @@ class WholeSearch:
         least = max(gain - self.doubt(), LEAST_OF_LEFT * self.plain_excess())
         if trial.gain < least or trial.left > LEFT_OF_EACH * self.left():
             return False
-        say(f"  whole recordings: {trial.law.key} in place of {law.key} gains {trial.gain:.0f}")
-        self.fit = trial.fit
-        self.taken = [w for w in self.taken if w is not law] + [trial.law]
-        alone = replace(trial, gain=self.rivals[law.key][0].gain + trial.gain)
-        self.rivals[trial.law.key] = [alone, *self.rivals[law.key]]
+        self.replaced(law, trial, say)
         return True
+
+    def nearest_number(self, law: Law, say) -> None:
+        """Take a law's like with another fixed number, or with its harmonic, that leaves less.
+
+        A wave of 13 cycles in a turn follows most of what one of 12 does, and one of 16 more of
+        a wave of 14 with its harmonic than 14 alone: a screening about parameters that are far
+        off does not tell which it is.
+        """
+        own, tried, taken = self.own, {law.key}, law
+        base = without(own, self.fit, law)
+        number = [self.with_harmonic(law, self.fit, base)]
+        while True:
+            near = [w for w in alike(law, self.laws) if w.key not in tried][:NEIGHBOURS]
+            tried |= {w.key for w in near}
+            for c in screen_again(own, base, screen(own, base, near)) if near else []:
+                fit = fitted(own, base, c, factors=SIZES)
+                number += [(c.law, fit), self.with_harmonic(c.law, fit, base)]
+            trials = [(w, self.in_place_of(taken, f)) for w, f in filter(None, number)]
+            better = [t for t in trials if t[1] is not None and t[1].gain > 0.0]
+            law, best = max(better, key=lambda t: t[1].gain, default=(law, None))
+            if best is None or best.left >= self.left():
+                return
+            self.replaced(taken, best, say)
+            taken, number = best.law, []
+
+    def with_harmonic(self, law: Law, fit: Estimate, base: Estimate) -> tuple | None:
+        """A law of a fixed number, and its fit with a further wave; None where it has none."""
+        forms = [w for w in self.laws if w.follows and w.law in law.richer and holds(w, law)]
+        if not forms or not _fixed(law):
+            return None
+        known = self.own.problem.values(fit.hypothesis, fit.x)[1][fit.hypothesis.laws.index(law)]
+        others = (other_values(self.own, fit, law), base.x)
+        _, h, x = begun_with(self.own, base, forms[0], known, others)
+        return law, self.own.fit(h, x, iterations=8)
 
     def other_forms(self, law: Law) -> list[tuple[Law, Trial]]:
         """A taken law, and what laws of its effect that hold it gain in its place."""
@@ -135,20 +167,33 @@ class WholeSearch:
         base = without(own, self.fit, law)
         others = (other_values(own, self.fit, law), base.x)
         begun = [begun_with(own, base, form, known, others) for form in forms]
-        found = []
-        for _, hypothesis, x in sorted(begun, key=lambda b: b[0])[:WHOLE_FORMS]:
-            form, fit = hypothesis.laws[-1], own.fit(hypothesis, x, iterations=8)
-            more = count_values(form) - count_values(law)
-            gain = self.fit.cost - fit.cost - PER_VALUE * more
-            if np.isfinite(gain) and not at_bound(own.problem, fit, form):
-                values = own.problem.values(hypothesis, fit.x)[1][-1]
-                c = Candidate(
-                    law=form, start=tuple(values[p.name] for p in form.unknowns), gain=gain,
-                    held_out=gain, deviation=0.0, size=1.0,
-                )  # fmt: skip
-                left = misfit(own, hypothesis, fit.x)
-                found.append((law, Trial(candidate=c, fit=fit, gain=gain, left=left)))
-        return found
+        trials = [
+            self.in_place_of(law, own.fit(hypothesis, x, iterations=8))
+            for _, hypothesis, x in sorted(begun, key=lambda b: b[0])[:WHOLE_FORMS]
+        ]
+        return [(law, t) for t in trials if t is not None]
+
+    def replaced(self, law: Law, trial: Trial, say) -> None:
+        """A law replaced by the one of a trial."""
+        say(f"  whole recordings: {trial.law.key} in place of {law.key} gains {trial.gain:.0f}")
+        self.fit = trial.fit
+        self.taken = [w for w in self.taken if w is not law] + [trial.law]
+        alone = replace(trial, gain=self.rivals[law.key][0].gain + trial.gain)
+        self.rivals[trial.law.key] = [alone, *self.rivals[law.key]]
+
+    def in_place_of(self, law: Law, fit: Estimate) -> Trial | None:
+        """What a fit gains whose last law takes the place of another one."""
+        own, form = self.own, fit.hypothesis.laws[-1]
+        more = count_values(form) - count_values(law)
+        gain = self.fit.cost - fit.cost - PER_VALUE * more
+        if not np.isfinite(gain) or at_bound(own.problem, fit, form):
+            return None
+        values = own.problem.values(fit.hypothesis, fit.x)[1][-1]
+        c = Candidate(
+            law=form, start=tuple(values[p.name] for p in form.unknowns), gain=gain,
+            held_out=gain, deviation=0.0, size=1.0,
+        )  # fmt: skip
+        return Trial(candidate=c, fit=fit, gain=gain, left=misfit(own, fit.hypothesis, fit.x))
 
     def plain_excess(self) -> float:
         """What parameters alone leave above the noise, in units."""
@@ -158,7 +203,7 @@ class WholeSearch:
         """Candidates fitted beside what was taken, best first."""
         have = {(law.effect, law.sensor) for law in self.taken}
         left = [w for w in self.laws if (w.effect, w.sensor) not in have]
-        screened = screen(self.own, self.fit, left)
+        screened = screen_again(self.own, self.fit, screen(self.own, self.fit, left))
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
         candidates = _most_promising(screened) + self.of_many_starts(left)
@@ -263,7 +308,24 @@ def holds(law: Law, plainer: Law) -> bool:
     """Whether a law has all values of another one of its effect and reading, and more."""
     names, fewer = ({p.name for p in w.unknowns} for w in (law, plainer))
     same = (law.effect, law.sensor) == (plainer.effect, plainer.sensor)
-    return same and fewer < names
+    return same and fewer < names and _fixed(plainer).items() <= _fixed(law).items()
+
+
+def _fixed(law: Law) -> dict[str, float]:
+    """Numbers of a law that no fit changes."""
+    return {p.name: p.low for p in law.unknowns if p.low == p.high}
+
+
+def alike(law: Law, laws: Sequence[Law]) -> list[Law]:
+    """Laws that differ from one in a number that no fit changes, the nearest first."""
+    fixed, found = _fixed(law), []
+    for other in laws:
+        numbers = _fixed(other)
+        names = [p.name for p in other.unknowns] == [p.name for p in law.unknowns]
+        same = (other.effect, other.sensor) == (law.effect, law.sensor) and names
+        if fixed and same and numbers != fixed:
+            found.append((sum(abs(numbers[name] - fixed[name]) for name in fixed), other))
+    return [other for _, other in sorted(found, key=lambda f: f[0])]
 
 
 def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:

@@ -40,7 +40,8 @@ def predicts_unseen(
     most : float
         Share of what they leave of the unseen rows, that the fit may leave.
     """
-    share = _left_unseen(own, fit) / _left_unseen(own, plain)
+    before, after = (max(_left_unseen(own, f), 0.0) for f in (plain, fit))
+    share = after / before if before > 0.0 else 1.0
     say(f"  whole recordings: of rows unseen {share:.2f} of what parameters leave remains")
     if share >= most:
         return False
@@ -90,14 +91,19 @@ def other_values(own: Estimator, fit: Estimate, law: Law) -> NDArray:
 
 
 def _left_unseen(own: Estimator, fit: Estimate) -> float:
-    """Cost of the rows after the first ones, to which alone the fit is made once more.
+    """Cost, beyond that of noise, of rows after the first ones, to which alone the fit is made.
 
     It begins at the values found in all rows: those that the first rows do not show (a torque that
     acts later) stay as they were, and are not tested.
     """
     first = own.having([replace(t, seen=FITTED_ROWS) for t in own.tracks])
-    x = first.fit(fit.hypothesis, fit.x, iterations=8).x
-    return _cost(own, fit.hypothesis, x) - _cost(first, fit.hypothesis, x)
+    trial = fit.hypothesis, first.fit(fit.hypothesis, fit.x, iterations=8).x
+    rows = zip(own.innovations([trial]), first.innovations([trial]), strict=True)
+    return sum(
+        0.5 * float(np.sum(huber_squares(every[0][hidden]) - 1.0))
+        for every, seen in rows
+        for hidden in [(seen[0] == 0.0) & (every[0] != 0.0)]
+    )
 
 
 def _cost(own: Estimator, h: Hypothesis, x: NDArray) -> float:
