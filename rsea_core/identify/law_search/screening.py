@@ -180,7 +180,7 @@ def screen_again(
     """
     known = {c.law.key: c.law for c in candidates}
     begun = [
-        replace(c.law, starts=(c.law.scaled(c.start, min(max(c.size, SMALLEST), LARGEST)),))
+        replace(c.law, starts=(c.law.scaled(c.start, np.clip(abs(c.size), SMALLEST, LARGEST)),))
         for c in candidates
     ]
     return [replace(c, law=known[c.law.key]) for c in screen(estimator, fit, begun)]

@@ -14,6 +14,7 @@ from rsea_core.identify.multistep.criteria import (
     COMPLETE_SHARE,
     EXPLAINED,
     INCOMPLETE,
+    LEAST_OF_LEFT,
     LEFT_OF_EACH,
     PER_VALUE,
     WHOLE_LAWS,
@@ -52,6 +53,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         pass
     if search.left() <= search.enough:
         search.prune(say)
+        search.refine(say)
         search.compare(say)
         search.predict(say)
         if search.complete(say):
@@ -73,10 +75,11 @@ def _other_timing(search: WholeSearch) -> CommandTiming | None:
     A drag that parameters lack can make a command that moves between its rows look held.
     """
     own, h = search.own, search.fit.hypothesis
+    least = max(search.doubt(), LEAST_OF_LEFT * search.plain_excess())
     for timing in timings(own.problem.case, own.problem.timing):
         problem = MultistepProblem(own.problem.case, timing=timing, steps=own.problem.steps)
         other = with_best_delay(with_problem(own, problem), h, search.fit.x)
-        if other.cost < search.fit.cost - search.doubt():
+        if other.cost < search.fit.cost - least:
             return timing
     return None
 

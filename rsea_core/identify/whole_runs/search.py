@@ -93,7 +93,8 @@ class WholeSearch:
         """Take the law that lowers the error most; whether there is one."""
         trials = self.trials()
         worth = [t.gain for t in trials[:1] if t.left <= LEFT_OF_EACH * self.left()]
-        if self.better_form(max(worth, default=0.0), say):
+        least = max(max(worth, default=0.0) - self.doubt(), LEAST_OF_LEFT * self.plain_excess())
+        if self.better_form(least, LEFT_OF_EACH, say):
             return True
         if not worth or worth[0] < LEAST_OF_LEFT * self.plain_excess():
             return False
@@ -106,21 +107,33 @@ class WholeSearch:
         self.nearest_number(best.law, say)
         return True
 
-    def better_form(self, gain: float, say) -> bool:
-        """Take another form of a law, if it is worth as much as a further law; whether it is.
+    def better_form(self, least: float, share: float, say) -> bool:
+        """Take another form of a law; whether there is one worth it.
 
         A law that is not quite right leaves errors which a further, wrong one may follow.
+
+        Parameters
+        ----------
+        least : float
+            Gain.
+        share : float
+            Of what is left, that it may leave.
         """
         trials = [t for law in self.taken for t in self.other_forms(law)]
         best = max(trials, key=lambda t: t[1].gain, default=None)
         if best is None:
             return False
         law, trial = best
-        least = max(gain - self.doubt(), LEAST_OF_LEFT * self.plain_excess())
-        if trial.gain < least or trial.left > LEFT_OF_EACH * self.left():
+        if trial.gain < least or trial.left > share * self.left():
             return False
         self.replaced(law, trial, say)
         return True
+
+    def refine(self, say) -> None:
+        """Forms of the laws taken that are clearly better; rivals are compared beside these."""
+        self.tried_forms.clear()
+        while self.better_form(self.doubt(), 1.0, say):
+            pass
 
     def nearest_number(self, law: Law, say) -> None:
         """Take a law's like with another fixed number, or with its harmonic, that leaves less.
