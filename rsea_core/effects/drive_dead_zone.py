@@ -19,8 +19,10 @@ DEAD_ZONE, DEAD_TIME, DEAD_TIME_CURRENT = slots("dead_zone", "dead_time_duty", "
 GOAL_DEAD_BAND = slots("goal_dead_band")
 ROUNDED_ZONE, AFTER_ZONE = slots("rounded_dead_zone", "offset_after_dead_zone")
 THRESHOLD = slots("command_threshold")
-STEEP = 0.1  # of the threshold: commands about it over which a drive begins to act
+STEEP = 0.03  # of the threshold: commands about it over which a drive begins to act
+THRESHOLDS_TRIED = (0.007, 0.014, 0.027, 0.04, 0.055, 0.075, 0.1, 0.14, 0.2, 0.28, 0.4)
 SERVO = "position_command_rad"
+ACTED_ON = frozenset({"duty", "voltage_V", "current_command_A", "motor_torque_Nm"})
 
 
 @njit(error_model="numpy", inline="always")
@@ -111,7 +113,7 @@ class DriveDeadZone(Term):
         bounds=(0.0, 1e5),
         source="half-width; dead time over switching period; a fit",
         meaning="Commands smaller than this give nothing; larger ones lose it. In the command's"
-        " own unit: duty, V or A.",
+        " own unit: duty, V, A or Nm.",
     )
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
@@ -135,8 +137,7 @@ class DriveDeadZone(Term):
     @classmethod
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """A width."""
-        commands = {"duty", "voltage_V", "current_command_A"} if typical.relative else {"duty"}
-        if not typical.commands & commands:
+        if not typical.commands & (ACTED_ON if typical.relative else {"duty"}):
             return ()
         size, relative = typical.command, typical.relative
         high, step = (size, 0.007 * size) if relative else (0.3, 0.002)
@@ -152,7 +153,7 @@ class DriveDeadZone(Term):
     def sentence(cls, f: FigureText) -> str:
         """The width."""
         width = f.figures["width_duty"]
-        return f"a dead zone of the drive, commands below {width:.3g} (duty of 1, V or A)"
+        return f"a dead zone of the drive, commands below {width:.3g} (duty of 1, V, A or Nm)"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -181,7 +182,7 @@ class RoundedDeadZone(DriveDeadZone):
 class ThresholdDeadZone(DriveDeadZone):
     """A drive that leaves out small commands and takes others whole, as servo amplifiers do.
 
-    acting command = u (1 + tanh((|u|/w - 1) / 0.1)) / 2: a step at w, of finite slope so that a
+    acting command = u (1 + tanh((|u|/w - 1) / 0.03)) / 2: a step at w, of finite slope so that a
     fit sees it.
 
     Source
@@ -198,17 +199,19 @@ class ThresholdDeadZone(DriveDeadZone):
 
     def equation(self) -> str:
         return (
-            f"acting duty = duty where |duty| > {self.width_duty:g}, else 0; the step is 10 % wide"
+            f"acting duty = duty where |duty| > {self.width_duty:g}, else 0;"
+            f" the step is {100 * STEEP:g} % wide"
         )
 
     @classmethod
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
-        """As of the plain zone."""
+        """As of the plain zone, of more widths: a step that is far off shows nothing."""
         if not typical.relative:
             return ()
+        starts = tuple((share * typical.command,) for share in THRESHOLDS_TRIED)
+        own = {"law": cls.name, "kind": cls, "write": writes_numbers(cls), "richer": ()}
         return tuple(
-            replace(law, law=cls.name, kind=cls, write=writes_numbers(cls), richer=())
-            for law in DriveDeadZone.candidates(typical)
+            replace(law, **own, starts=starts) for law in DriveDeadZone.candidates(typical)
         )
 
 

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -30,6 +30,7 @@ from rsea_core.machine.rig import Rig
     WORM_ERROR_3,
     WORM_PHASE_3,
     ERROR_AT_ZERO,
+    WHEEL_CYCLES,
 ) = slots(
     "wheel_error",
     "wheel_error_phase",
@@ -42,6 +43,7 @@ from rsea_core.machine.rig import Rig
     "worm_error_3",
     "worm_error_3_phase",
     "gear_error_at_zero",
+    "wheel_error_cycles",
 )
 
 
@@ -51,10 +53,11 @@ def angle_error(fx, wheel, gear_ratio):
     seconds = fx[WHEEL_ERROR_2] != 0.0 or fx[WORM_ERROR_2] != 0.0 or fx[WORM_ERROR_3] != 0.0
     if fx[WHEEL_ERROR] == 0.0 and fx[WORM_ERROR] == 0.0 and not seconds:
         return 0.0, 0.0
-    slow = wheel + fx[WHEEL_PHASE]
+    cycles = max(fx[WHEEL_CYCLES], 1.0)
+    slow = cycles * wheel + fx[WHEEL_PHASE]
     fast = gear_ratio * wheel + fx[WORM_PHASE]
     error = fx[WHEEL_ERROR] * np.sin(slow) + fx[WORM_ERROR] * np.sin(fast)
-    slope = fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
+    slope = cycles * fx[WHEEL_ERROR] * np.cos(slow) + gear_ratio * fx[WORM_ERROR] * np.cos(fast)
     if seconds:
         slow = 2.0 * wheel + fx[WHEEL_PHASE_2]
         fast = 2.0 * gear_ratio * wheel + fx[WORM_PHASE_2]
@@ -106,14 +109,16 @@ HARMONICS = (
     ("worm", "2_", WORM_ERROR_2, WORM_PHASE_2),
     ("worm", "3_", WORM_ERROR_3, WORM_PHASE_3),
 )
+CYCLES, CYCLES_TRIED = "wheel_cycles_per_rev", (2, 3, 4)
+OFFSET = "offset_rad"
 HARMONIC = {"": "", "2_": "second_", "3_": "third_"}
 
 
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Position error once and twice per turn of wheel and worm, thrice per turn of the worm.
 
-    It counts from where the angles read zero. A spring is slack there: what the phases of wheel
-    and worm make there is in no reading.
+    It counts from where the angles read zero: a spring is slack there, but for an offset of the
+    encoders, whose zeros nobody sets where the gear's error is zero.
     """
     at_zero = 0.0
     for part, wave, amplitude, phase in HARMONICS:
@@ -123,18 +128,27 @@ def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
             d.put(amplitude, float(np.hypot(a, b)))
             d.put(phase, float(np.arctan2(b, a)))
             at_zero += b
-    d.put(ERROR_AT_ZERO, at_zero)
+    d.put(WHEEL_CYCLES, v.get(CYCLES, 1.0))
+    d.put(ERROR_AT_ZERO, at_zero - v.get(OFFSET, 0.0))
 
 
 def _parameters(v: Values, rig: Rig) -> Values:
     """Amplitude and phase for a pair of waves."""
-    given = {}
+    given = {name: v[name] for name in (CYCLES, OFFSET) if name in v}
     for part, wave, _, _ in HARMONICS:
         if f"{part}_sin_{wave}rad" in v:
             a, b = v[f"{part}_sin_{wave}rad"], v[f"{part}_cos_{wave}rad"]
             given[f"{part}_{HARMONIC[wave]}amplitude_rad"] = float(np.hypot(a, b))
             given[f"{part}_{HARMONIC[wave]}phase_rad"] = float(np.arctan2(b, a))
     return given
+
+
+def _with(zero: Unknown, law: Law) -> Law:
+    """A law of the wheel with an offset of the encoders."""
+    if not any(u.name.startswith("wheel") for u in law.unknowns):
+        return law
+    starts = tuple((*start, 0.0) for start in law.starts)
+    return replace(law, unknowns=(*law.unknowns, zero), starts=starts)
 
 
 def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
@@ -145,9 +159,9 @@ def _drawn(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
 class GearTransmissionError(Term):
     """Position error periodic in the angles of wheel and worm, as lost angle at the spring.
 
-    The spring sees theta_w + e(theta_w) - e(0), slack where the angles are zero, and the wheel
-    tau_s (1 + e'), so that no energy is made. The wheel's own inertia behind the error is
-    neglected.
+    The spring sees theta_w + e(theta_w) - e(0) + offset, slack where the angles are zero but for
+    the offset, and the wheel tau_s (1 + e'), so that no energy is made. The wheel's own inertia
+    behind the error is neglected.
     """
 
     effect: ClassVar[str] = "gear-transmission-error"
@@ -172,7 +186,7 @@ class GearTransmissionError(Term):
         unit="rad (at the wheel)",
         bounds=(0.0, 0.05),
         source="eccentricity, once per turn",
-        meaning="Amplitude of the position error once per turn of the wheel.",
+        meaning="Amplitude of the position error periodic in the angle of the wheel.",
     )
     wheel_phase_rad: float = parameter(
         0.0,
@@ -180,6 +194,14 @@ class GearTransmissionError(Term):
         bounds=(-7.0, 7.0),
         source="a fit",
         meaning="Phase of the wheel error at wheel angle zero.",
+    )
+    wheel_cycles_per_rev: float = parameter(
+        1.0,
+        unit="-",
+        bounds=(1.0, 1e4),
+        source="eccentricity 1, ovality 2, a part that is held by three screws 3",
+        free=False,
+        meaning="Periods of that error in a turn of the wheel.",
     )
     worm_amplitude_rad: float = parameter(
         0.0,
@@ -194,6 +216,13 @@ class GearTransmissionError(Term):
         bounds=(-7.0, 7.0),
         source="a fit",
         meaning="Phase of the worm error at motor angle zero.",
+    )
+    offset_rad: float = parameter(
+        0.0,
+        unit="rad (at the wheel)",
+        bounds=(-0.05, 0.05),
+        source="where the encoders' zeros were set; a fit",
+        meaning="Lost angle where the angles read zero.",
     )
     wheel_second_amplitude_rad: float = _amplitude("wheel", 2, "ovality; a fit")
     wheel_second_phase_rad: float = _phase("wheel", 2)
@@ -240,7 +269,8 @@ class GearTransmissionError(Term):
             "worm_error_2_phase": self.worm_second_phase_rad,
             "worm_error_3": self.worm_third_amplitude_rad,
             "worm_error_3_phase": self.worm_third_phase_rad,
-            "gear_error_at_zero": self.error_at_zero_rad,
+            "gear_error_at_zero": self.error_at_zero_rad - self.offset_rad,
+            "wheel_error_cycles": self.wheel_cycles_per_rev,
         }
 
     def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
@@ -248,9 +278,10 @@ class GearTransmissionError(Term):
         return "needs a spring, whose deflection it changes" if rigid else None
 
     def equation(self) -> str:
+        turns = "" if self.wheel_cycles_per_rev == 1.0 else f"{self.wheel_cycles_per_rev:g} "
         return (
             "tau_s = f(theta_w + e - theta_l), wheel feels tau_s (1 + de/dtheta_w),"
-            f" e = {self.wheel_amplitude_rad:g} sin(theta_w + {self.wheel_phase_rad:g})"
+            f" e = {self.wheel_amplitude_rad:g} sin({turns}theta_w + {self.wheel_phase_rad:g})"
             f" + {self.worm_amplitude_rad:g} sin(theta_m + {self.worm_phase_rad:g})"
             + "".join(
                 f" + {a:g} sin({angle} + {p:g})"
@@ -261,7 +292,7 @@ class GearTransmissionError(Term):
                 )
                 if a
             )
-            + f" - {self.error_at_zero_rad:g}"
+            + f" - {self.error_at_zero_rad - self.offset_rad:g}"
         )
 
     @classmethod
@@ -299,7 +330,21 @@ class GearTransmissionError(Term):
         )  # fmt: skip
         twice = Law(law="worm, twice a turn", unknowns=pair("worm", "2_", WORM_ERROR_rad),
                     starts=((small, 0.0),), richer=("two harmonics",), **common)  # fmt: skip
-        return (*found, twice) if typical.relative else found
+        several = [
+            law
+            for n in CYCLES_TRIED
+            for fixed in [Unknown(name=CYCLES, unit="-", low=n, high=n, scale=0.0)]
+            for law in (
+                Law(law=f"wheel, {n} a turn", unknowns=(*wheel, fixed), **common,
+                    starts=((small, 0.0, float(n)),), richer=(f"wheel, {n} a turn, and worm",)),
+                Law(law=f"wheel, {n} a turn, and worm", unknowns=(*wheel, fixed, *worm), **common,
+                    starts=((small, 0.0, float(n), small, 0.0),), follows=True),
+            )
+        ]  # fmt: skip
+        if not typical.relative:
+            return found
+        zero = Unknown(name=OFFSET, unit="rad", prior=WHEEL_ERROR_rad, **bounds)
+        return tuple(_with(zero, law) for law in (*found, twice, *several))
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:

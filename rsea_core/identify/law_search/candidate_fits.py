@@ -58,15 +58,15 @@ def fitted(
     short : Estimator or None
         In short windows, where a law that is far off still predicts in phase: a further start.
     factors : sequence of float
-        Of the size that the screening saw: starts.
+        Of the size that the screening saw: starts, beside its own.
     """
     problem = estimator.problem
     h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
     n = len(problem.nominals)
     trials = []
     others = base.x if c.start_values is None else c.start_values
-    for factor in factors:
-        start = c.law.scaled(c.start, min(max(c.size, 1e-3), 1e3) * factor)
+    begun = [c.law.scaled(c.start, min(max(c.size, 1e-3), 1e3) * factor) for factor in factors]
+    for start in (*begun, c.start):  # not every size acts in proportion
         own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
         trials.append((h, np.concatenate([others, own])))
     if short is not None:

@@ -176,14 +176,23 @@ def screen_again(
     """Candidates screened at the sizes that a first screening found.
 
     A machine that turns freely answers the sizes of the first one out of proportion: it stops
-    in a well of a torque that is ten times too large, and the column says nothing of the law.
+    in a well of a torque that is ten times too large, and the column says nothing of the law. What
+    is no wave has sizes that act otherwise, as a threshold does: there the better one stands.
     """
     known = {c.law.key: c.law for c in candidates}
     begun = [
-        replace(c.law, starts=(c.law.scaled(c.start, np.clip(abs(c.size), SMALLEST, LARGEST)),))
+        replace(
+            c.law, starts=(c.law.scaled(c.start, float(np.clip(abs(c.size), SMALLEST, LARGEST))),)
+        )
         for c in candidates
     ]
-    return [replace(c, law=known[c.law.key]) for c in screen(estimator, fit, begun)]
+    again = [replace(c, law=known[c.law.key]) for c in screen(estimator, fit, begun)]
+    best: dict[str, Candidate] = {}
+    waves = {c.law.key for c in again if quarter_turn(c.law, c.start) is not None}
+    first = [c for c in candidates if c.law.key not in waves]
+    for c in sorted((*first, *again), key=lambda c: -c.gain):
+        best.setdefault(c.law.key, c)
+    return list(best.values())
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:

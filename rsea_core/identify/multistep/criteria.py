@@ -73,6 +73,7 @@ STEP_ERROR = 0.2  # deviations of innovations that the engine's step may move, r
 FIRST_STEPS, SEARCH_STEPS = 25.0, 50.0  # per fastest cycle: as windows grow, in the law search
 LEAST_FINENESS, STEP_ROUNDS = 1.0 / 32.0, 3  # of such a step; looks
 RICHARDSON = 4.0 / 3.0  # error of a step over what half of it changes, second order
+SENSOR_COLOUR_ROWS = 20  # time constant of a sensor's coloured noise at most; longer: the model
 SENSORS_ALONE = 0.003  # of the estimated unknown torques, where the sensors' noise is all there is
 COMPLETE = 1.6  # misfit of whole recordings in noise deviations that is as good as none
 SOUND, INCOMPLETE = 2.0, 2.5  # misfit of parameters alone: nothing lacks; laws are looked for

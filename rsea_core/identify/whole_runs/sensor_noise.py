@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.criteria import SENSORS_ALONE
+from rsea_core.identify.multistep.criteria import SENSOR_COLOUR_ROWS, SENSORS_ALONE
 from rsea_core.identify.multistep.estimator import Estimator
 from rsea_core.identify.multistep.horizons import with_windows
 from rsea_core.identify.multistep.kalman_filter import huber_squares
@@ -22,11 +22,15 @@ from rsea_core.identify.multistep.tracks import prepared
 
 
 def in_sensor_noise(estimator: Estimator) -> Estimator:
-    """Another estimator, of whole recordings, with the readings' noise and hardly any torques'."""
+    """Another estimator, of whole recordings, with the readings' noise and hardly any torques'.
+
+    Errors that last over many rows are the model's: a sensor's colour is its filter's.
+    """
     tracks = []
     for t in with_windows(estimator, None):
         noise, readings = t.noise, t.noise.readings
-        if noise.colours.size:
+        row_s = t.block * t.experiment.recording.sample_time_s
+        if noise.colours.size and noise.colour_time_s < SENSOR_COLOUR_ROWS * row_s:
             readings = np.hypot(readings, noise.colours)
         inputs, colours = SENSORS_ALONE * noise.inputs, 0.0 * noise.colours
         noise = replace(noise, inputs=inputs, readings=readings, colours=colours)
