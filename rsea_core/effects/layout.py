@@ -77,6 +77,7 @@ from rsea_core.effects.gear_load_friction import (  # noqa: F401
 )
 from rsea_core.effects.gear_transmission_error import (  # noqa: F401
     ERROR_AT_ZERO,
+    WHEEL_CYCLES,
     WHEEL_ERROR,
     WHEEL_ERROR_2,
     WHEEL_PHASE,

@@ -242,8 +242,8 @@ class MotorCogging(Term):
         direct = rig is not None and rig.axis == "linear" and (rig.gear_ratio or 1.0) == 1.0
         if direct and typical.relative:
             return linear_motor_cogging(typical)
-        waves = [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
-        return [w for wave in waves for w in with_harmonic(wave)] if typical.relative else waves
+        found = [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
+        return [w for law in found for w in with_harmonic(law)] if typical.relative else found
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:

@@ -7,7 +7,7 @@ static double rsea_acting(double command) {
     if (E_rounded_dead_zone != 0.0)
         command -= E_rounded_dead_zone * tanh(command / E_rounded_dead_zone);
     if (E_command_threshold != 0.0)
-        command *= 0.5 + 0.5 * tanh((fabs(command) / E_command_threshold - 1.0) / 0.1);
+        command *= 0.5 + 0.5 * tanh((fabs(command) / E_command_threshold - 1.0) / 0.03);
     if (fabs(command) <= E_dead_zone) command = 0.0;
     else command -= command > 0.0 ? E_dead_zone : -E_dead_zone;
     command += E_offset_after_dead_zone;
@@ -81,7 +81,7 @@ static double rsea_wheel_torque(double wheel, double speed) {
 /* The gear's position error at a wheel angle, and its slope. */
 static double rsea_gear_error(double wheel) {
     const double worm = GEAR_RATIO * wheel;
-    return E_wheel_error * sin(wheel + E_wheel_error_phase)
+    return E_wheel_error * sin(E_wheel_error_cycles * wheel + E_wheel_error_phase)
         + E_worm_error * sin(worm + E_worm_error_phase)
         + E_wheel_error_2 * sin(2.0 * wheel + E_wheel_error_2_phase)
         + E_worm_error_2 * sin(2.0 * worm + E_worm_error_2_phase)
@@ -89,7 +89,7 @@ static double rsea_gear_error(double wheel) {
 }
 static double rsea_gear_error_slope(double wheel) {
     const double worm = GEAR_RATIO * wheel;
-    return E_wheel_error * cos(wheel + E_wheel_error_phase)
+    return E_wheel_error_cycles * E_wheel_error * cos(E_wheel_error_cycles * wheel + E_wheel_error_phase)
         + GEAR_RATIO * E_worm_error * cos(worm + E_worm_error_phase)
         + 2.0 * E_wheel_error_2 * cos(2.0 * wheel + E_wheel_error_2_phase)
         + 2.0 * GEAR_RATIO * E_worm_error_2 * cos(2.0 * worm + E_worm_error_2_phase)

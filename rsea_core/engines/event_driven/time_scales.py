@@ -39,6 +39,8 @@ def rates_per_s(
         if fx[wave] != 0.0:
             rates.append(np.sqrt(fx[wave] * fx[wave + 1] / inertia))
             rates.append(fx[wave + 1] * wheel_speed)
+    if fx[e.WHEEL_ERROR] != 0.0:
+        rates.append(fx[e.WHEEL_CYCLES] * wheel_speed)
     if fx[e.WORM_ERROR] != 0.0:
         rates.append(gear_ratio * wheel_speed)
     if fx[e.WORM_ERROR_2] != 0.0:

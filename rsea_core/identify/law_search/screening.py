@@ -188,8 +188,8 @@ def screen_again(
     ]
     again = [replace(c, law=known[c.law.key]) for c in screen(estimator, fit, begun)]
     best: dict[str, Candidate] = {}
-    waves = {c.law.key for c in again if quarter_turn(c.law, c.start) is not None}
-    first = [c for c in candidates if c.law.key not in waves]
+    pairs = {c.law.key for c in again if quarter_turn(c.law, c.start) is not None}
+    first = [c for c in candidates if c.law.key not in pairs]
     for c in sorted((*first, *again), key=lambda c: -c.gain):
         best.setdefault(c.law.key, c)
     return list(best.values())

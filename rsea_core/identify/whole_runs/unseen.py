@@ -100,9 +100,9 @@ def _left_unseen(own: Estimator, fit: Estimate) -> float:
     trial = fit.hypothesis, first.fit(fit.hypothesis, fit.x, iterations=8).x
     rows = zip(own.innovations([trial]), first.innovations([trial]), strict=True)
     return sum(
-        0.5 * float(np.sum(huber_squares(every[0][hidden]) - 1.0))
+        0.5 * float(np.sum(huber_squares(every[0][later]) - 1.0))
         for every, seen in rows
-        for hidden in [(seen[0] == 0.0) & (every[0] != 0.0)]
+        for later in [(seen[0] == 0.0) & (every[0] != 0.0)]
     )
 
 

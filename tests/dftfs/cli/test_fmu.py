@@ -49,7 +49,8 @@ GEAR = (
     ),
     r.GearEfficiency(drive_efficiency=0.8, backdrive_efficiency=0.6),
     r.GearTransmissionError(
-        wheel_amplitude_rad=2e-3, worm_amplitude_rad=1e-3, worm_phase_rad=0.4,
+        wheel_amplitude_rad=2e-3, wheel_cycles_per_rev=3.0, offset_rad=5e-4,
+        worm_amplitude_rad=1e-3, worm_phase_rad=0.4,
         worm_third_amplitude_rad=1e-4,
     ),
     r.GearFormulaTorque(
