@@ -17,13 +17,14 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     PER_VALUE,
+    SOUND,
     WHOLE_LAWS,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect
-from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit
+from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit, well_fitted
 from rsea_core.identify.whole_runs.unseen import needed, predicts_unseen, without
 
 
@@ -44,6 +45,9 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     own = in_sensor_noise(found.base_estimator)
     plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
     left = misfit(own, plain.hypothesis, plain.x)
+    if left > SOUND:
+        plain = well_fitted(own, plain)
+        left = misfit(own, plain.hypothesis, plain.x)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
     if not INCOMPLETE < left < np.inf:

@@ -35,7 +35,7 @@ from rsea_core.identify.multistep.criteria import (
     WHOLE_TRIED,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.whole_runs.sensor_noise import excess, misfit
+from rsea_core.identify.whole_runs.sensor_noise import excess, misfit, well_fitted
 from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
 
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
@@ -101,7 +101,7 @@ class WholeSearch:
         best = trials[0]
         say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
         self.first = self.first or trials
-        self.fit = best.fit
+        self.fit = well_fitted(self.own, best.fit)
         self.taken.append(best.law)
         self.rivals[best.law.key] = trials
         self.nearest_number(best.law, say)
@@ -318,10 +318,11 @@ def _of_other_effects(screened: Sequence[Candidate], tried: Sequence[Candidate])
 
 
 def holds(law: Law, plainer: Law) -> bool:
-    """Whether a law has all values of another one of its effect and reading, and more."""
+    """Whether a law has all values of another one of its effect and reading, or more."""
     names, fewer = ({p.name for p in w.unknowns} for w in (law, plainer))
     same = (law.effect, law.sensor) == (plainer.effect, plainer.sensor)
-    return same and fewer < names and _fixed(plainer).items() <= _fixed(law).items()
+    same = same and law.key != plainer.key
+    return same and fewer <= names and _fixed(plainer).items() <= _fixed(law).items()
 
 
 def _fixed(law: Law) -> dict[str, float]:

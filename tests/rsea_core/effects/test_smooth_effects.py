@@ -152,14 +152,17 @@ CASES = {
         GearTransmissionError(
             wheel_amplitude_rad=0.01,
             wheel_phase_rad=0.3,
+            wheel_cycles_per_rev=3.0,
+            offset_rad=2e-3,
             worm_amplitude_rad=5e-4,
             worm_phase_rad=-0.5,
         ),
         {
             "error": lambda wheel: (
-                0.01 * (np.sin(wheel + 0.3) - np.sin(0.3))
+                2e-3
+                + 0.01 * (np.sin(3.0 * wheel + 0.3) - np.sin(0.3))
                 + 5e-4 * (np.sin(N * wheel - 0.5) - np.sin(-0.5)),
-                0.01 * np.cos(wheel + 0.3) + N * 5e-4 * np.cos(N * wheel - 0.5),
+                0.03 * np.cos(3.0 * wheel + 0.3) + N * 5e-4 * np.cos(N * wheel - 0.5),
             )
         },
     ),
