@@ -34,6 +34,8 @@ class TypicalMagnitudes:
         What drives the recordings.
     peak_current_A : float or None
         The largest that was read, or else commanded.
+    often_read_A : float or None
+        The current below which 98 % of a recording's readings are, of the largest; None: not read.
     command : float
         Largest standard deviation of the command, in its own unit.
     relative : bool
@@ -59,6 +61,7 @@ class TypicalMagnitudes:
     rig: Rig | None = None
     commands: frozenset[str | None] = frozenset({"duty"})
     peak_current_A: float | None = None
+    often_read_A: float | None = None
     command: float = 0.3
     relative: bool = False
     angle_rad: float = 0.5

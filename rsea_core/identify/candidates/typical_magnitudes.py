@@ -58,7 +58,8 @@ def own_magnitudes(case: Case) -> TypicalMagnitudes:
         columns=tuple({c for r in case.identification for c in r.responses}),
         loads=tuple({r.load.kind for r in case.identification}),
         rig=rig, commands=frozenset(r.command_name for r in case.identification),
-        peak_current_A=_peak_current_A(case), command=_command(case), relative=True,
+        peak_current_A=_peak_current_A(case), often_read_A=_largest(case, "current_A", 98.0),
+        command=_command(case), relative=True,
         begins_deflected=_begins_deflected(case, deflection or load / K),
         spans={column: _span(case, column) for column in FITTED},
     )  # fmt: skip
@@ -169,15 +170,16 @@ def _bench_magnitudes(case: Case) -> TypicalMagnitudes:
 
 def _peak_current_A(case: Case) -> float | None:
     """The largest current that was read, or else commanded; None where there is none."""
-    for column in ("current_A", "current_command_A"):
-        seen = [
-            float(np.percentile(np.abs(r[column]), 99.9))
-            for r in case.identification
-            if column in r
-        ]
-        if seen:
-            return max(seen)
-    return None
+    read = _largest(case, "current_A", 99.9)
+    return _largest(case, "current_command_A", 99.9) if read is None else read
+
+
+def _largest(case: Case, column: str, percentile: float) -> float | None:
+    """Percentile of a column's sizes, the largest of all recordings; None where there is none."""
+    seen = [
+        np.percentile(np.abs(r[column]), percentile) for r in case.identification if column in r
+    ]
+    return float(max(seen)) if seen else None
 
 
 def _command(case: Case) -> float:

@@ -52,6 +52,7 @@ class Track:
     log_det: float
     block: int  # rows averaged to one
     seen: float = 1.0  # share of the rows, from the first on, that count
+    lead: int = 0  # first rows that do not count
 
     @property
     def blocks(self) -> int:
@@ -73,6 +74,7 @@ class Track:
             Filter(e.A, e.mode, e.C, self.gain, self.root, self.begins), self.averaged(residual)
         )
         out[:, int(np.ceil(self.seen * self.blocks)) :] = 0.0
+        out[:, : self.lead // self.block] = 0.0
         return out
 
 

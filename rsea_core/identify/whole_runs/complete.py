@@ -42,7 +42,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     Found or None
         Where none does: the one law that leaves little more, for where windows show nothing.
     """
-    own = in_sensor_noise(found.base_estimator)
+    own = in_sensor_noise(found.base_estimator, found.base)
     plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
     left = misfit(own, plain.hypothesis, plain.x)
     if left > SOUND:
@@ -117,7 +117,8 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     """
     if not INCOMPLETE < found.left_by_parameters < np.inf:
         return found
-    own, h = in_sensor_noise(found.base_estimator), found.best.hypothesis
+    own = in_sensor_noise(found.base_estimator, found.base)
+    h = found.best.hypothesis
     fit = own.fit(h, found.best.x, iterations=12)
     left = misfit(own, h, fit.x) if found.steps else np.inf
     laws = [step.law for step in found.steps]

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import (
     LEAST_GAIN,
@@ -23,18 +24,27 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import with_windows
 from rsea_core.identify.multistep.kalman_filter import huber_squares
-from rsea_core.identify.multistep.tracks import prepared
+from rsea_core.identify.multistep.tracks import Track, prepared
 
+UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
 MOVES = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
 
 
-def in_sensor_noise(estimator: Estimator) -> Estimator:
+def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estimator:
     """Another estimator, of whole recordings, with the readings' noise and hardly any torques'.
 
     Errors that last over many rows are the model's: a sensor's colour is its filter's.
+
+    Parameters
+    ----------
+    fit : Estimate or None
+        What states how late commands act. A recording that begins in motion does not hold the
+        commands that act in its first rows: these do not count.
     """
+    late_s = 0.0 if fit is None else _delay_s(estimator, fit)
     tracks = []
     for t in with_windows(estimator, None):
+        t = _without_lead(t, late_s)
         noise, readings = t.noise, t.noise.readings
         row_s = t.block * t.experiment.recording.sample_time_s
         if noise.colours.size and noise.colour_time_s < SENSOR_COLOUR_ROWS * row_s:
@@ -45,6 +55,27 @@ def in_sensor_noise(estimator: Estimator) -> Estimator:
     own = estimator.having(tracks)
     own.tempering = 1.0
     return own
+
+
+def _delay_s(estimator: Estimator, fit: Estimate) -> float:
+    """How late commands act, by a fit."""
+    _, values = estimator.problem.values(fit.hypothesis, fit.x)
+    laws = zip(fit.hypothesis.laws, values, strict=True)
+    return max((v["delay_s"] for law, v in laws if law.kind is DriveDelay), default=0.0)
+
+
+def _without_lead(t: Track, late_s: float) -> Track:
+    """A track of a whole recording without rows in which commands before it act.
+
+    The smoother, which did not know these, is sure of a wrong motion at their end.
+    """
+    r, whole = t.experiment.recording, t.windows
+    lead = t.block * int(np.ceil(late_s / r.sample_time_s / t.block))
+    if r.initial_rest or not 0 < lead < whole.rows[-1, 1] // 2:
+        return t
+    rows = np.array([[0, lead - 1], [lead, whole.rows[-1, 1]]])
+    spread = np.concatenate([t.motion_std[:lead], UNSURE * t.motion_std[lead:]])
+    return replace(t, windows=replace(whole, rows=rows), motion_std=spread, lead=lead)
 
 
 def well_fitted(own: Estimator, fit: Estimate) -> Estimate:
