@@ -11,7 +11,7 @@ from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import fitted
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.law_search.screening import screen, screen_again
+from rsea_core.identify.law_search.screening import Projection, screen, screen_again
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
@@ -62,10 +62,16 @@ def test_a_wave_of_a_neighbouring_number_gives_way_to_the_true_one_with_its_harm
     searched.rivals = {wrong.key: [Trial(candidate=c, fit=fit, gain=gain, left=left)]}
     searched.nearest_number(wrong, lambda text: None)
     assert [w.law for w in searched.taken] == ["12 per turn, two waves"]
-    values = own.problem.values(searched.fit.hypothesis, searched.fit.x)[1][-1]
-    found = [float(np.hypot(values[f"sin_{k}Nm"], values[f"cos_{k}Nm"])) for k in ("", "2_")]
-    assert found == pytest.approx([AMPLITUDE_Nm, HARMONIC_Nm], rel=0.1)
     assert searched.left() < 1.3 < left
+    fit = searched.fit
+    values = own.problem.values(fit.hypothesis, fit.x)[1][-1]
+    root = Projection(own, fit).L  # of the information matrix
+    deviation = np.sqrt(np.diag(np.linalg.inv(root @ root.T)))
+    scale = max(u.scale for u in fit.hypothesis.laws[-1].unknowns)
+    of_first, of_second = ("", slice(-4, -2), AMPLITUDE_Nm), ("2_", slice(-2, None), HARMONIC_Nm)
+    for kind, wave, truth in (of_first, of_second):
+        found = float(np.hypot(values[f"sin_{kind}Nm"], values[f"cos_{kind}Nm"]))
+        assert abs(found - truth) < 3.0 * scale * max(deviation[wave])
 
 
 def test_numbers_that_no_fit_changes_tell_laws_apart(searched):
