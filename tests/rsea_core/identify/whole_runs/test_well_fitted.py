@@ -1,0 +1,58 @@
+"""Fits of whole recordings: minima a cycle away are left, and rows of unknown commands not used."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.horizons import parameters_with_timing
+from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit, well_fitted
+from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig, pendulum_case
+
+
+@pytest.fixture(scope="module")
+def swinging(tmp_path_factory):
+    """A bare pendulum that swings for twenty seconds, in the noise of its encoder."""
+    case = pendulum_case(tmp_path_factory.mktemp("pendulum"), seed=1)
+    h = Hypothesis(laws=nuisances(case))
+    estimator, base, _ = parameters_with_timing(case, h, lambda text: None)
+    own = in_sensor_noise(estimator)
+    return own, own.fit(h, base.x, iterations=12)
+
+
+def test_a_fit_whose_swing_is_cycles_early_finds_the_right_one(swinging):
+    own, best = swinging
+    x = best.x.copy()
+    x[[p.key for p in own.problem.nominals].index("load_inertia_kgm2")] -= 30.0  # its lower bound
+    stuck = own.fit(best.hypothesis, x, iterations=12)
+    found = well_fitted(own, stuck)
+    left = [misfit(own, f.hypothesis, f.x) for f in (best, stuck, found)]
+    assert left[0] < 1.2
+    assert left[1] > 10.0
+    assert left[2] < 1.2
+
+
+def test_rows_in_which_unknown_commands_act_do_not_count(tmp_path):
+    late_rows = 12
+    whole = axis_recording(seed=1, delay_rows=late_rows)
+    first = 300  # the recording begins in motion, and the commands before it are not in it
+    columns = {name: values[first:] for name, values in whole.columns.items()}
+    columns["time_s"] = columns["time_s"] - columns["time_s"][0]
+    moving = replace(whole, columns=columns, initial_rest=False)
+    case = axis_case(tmp_path, moving, rig=axis_rig())
+    h = Hypothesis(laws=nuisances(case))
+    estimator, base, _ = parameters_with_timing(case, h, lambda text: None)
+    values = estimator.problem.values(h, base.x)[1]
+    delay = next(v["delay_s"] for w, v in zip(h.laws, values, strict=True) if w.kind is DriveDelay)
+    assert delay == pytest.approx(late_rows * ROW_s, abs=ROW_s)
+    all_rows, known = in_sensor_noise(estimator), in_sensor_noise(estimator, base)
+    assert all_rows.tracks[0].lead == 0
+    assert known.tracks[0].lead == pytest.approx(late_rows, abs=1)
+    e = known.innovations([(h, base.x)])[0][0]
+    assert np.all(e[: known.tracks[0].lead] == 0.0)
+    left = [misfit(own, h, own.fit(h, base.x, iterations=12).x) for own in (all_rows, known)]
+    assert left[1] < 1.5
+    assert left[0] > 3.0 * left[1]
