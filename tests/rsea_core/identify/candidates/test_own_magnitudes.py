@@ -1,8 +1,12 @@
 """Candidates for any machine hold no absolute number: all follow the machine's torque and time."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rsea_core.effects.drive_dead_zone import DriveDeadZone, RoundedDeadZone, ThresholdDeadZone
+from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.layout import N_EFFECTS
 from rsea_core.effects.variant import PLANT, RunConditions, TrialMachine
 from rsea_core.identify.candidates.catalogue import catalogue
@@ -89,3 +93,25 @@ def written(law, values):
         time_s=np.zeros(2),
     ))  # fmt: skip
     return machine.fx.tolist(), machine.plant.tolist()
+
+
+def test_no_current_limit_is_tried_below_the_currents_that_are_often_read(cases):
+    typical = replace(own_magnitudes(cases[0]), peak_current_A=3.0)
+
+    def least_limit_A(read):
+        laws = DriveSaturation.candidates(replace(typical, often_read_A=read))
+        return next(w for w in laws if w.law == "limit").unknowns[0].low
+
+    assert typical.often_read_A is None  # an axis that reads its angle alone
+    assert least_limit_A(None) == pytest.approx(0.3)
+    assert least_limit_A(2.0) == pytest.approx(1.8)
+    assert least_limit_A(100.0) < typical.rig.current_limit_A
+
+
+@pytest.mark.parametrize("law", [DriveDeadZone, RoundedDeadZone, ThresholdDeadZone])
+def test_a_drive_that_is_commanded_a_torque_may_have_a_dead_zone(cases, law):
+    typical = replace(own_magnitudes(cases[0]), commands=frozenset({"motor_torque_Nm"}))
+    (found,) = law.candidates(replace(typical, command=2.0))
+    assert found.unknowns[0].high == 2.0
+    assert found.starts[0][0] == pytest.approx(0.014)
+    assert not law.candidates(replace(typical, commands=frozenset({"position_command_rad"})))
