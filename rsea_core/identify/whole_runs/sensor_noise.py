@@ -70,8 +70,9 @@ def _without_lead(t: Track, late_s: float) -> Track:
     The smoother, which did not know these, is sure of a wrong motion at their end.
     """
     r, whole = t.experiment.recording, t.windows
-    lead = t.block * int(np.ceil(late_s / r.sample_time_s / t.block))
-    if r.initial_rest or not 0 < lead < whole.rows[-1, 1] // 2:
+    late_rows = late_s / r.sample_time_s
+    lead = t.block * int(np.ceil(max(late_rows, 2.0) / t.block))  # a window has two rows at least
+    if r.initial_rest or late_s == 0.0 or lead > whole.rows[-1, 1] // 2:
         return t
     rows = np.array([[0, lead - 1], [lead, whole.rows[-1, 1]]])
     spread = np.concatenate([t.motion_std[:lead], UNSURE * t.motion_std[lead:]])

@@ -53,6 +53,9 @@ def test_rows_in_which_unknown_commands_act_do_not_count(tmp_path):
     assert known.tracks[0].lead == pytest.approx(late_rows, abs=1)
     e = known.innovations([(h, base.x)])[0][0]
     assert np.all(e[: known.tracks[0].lead] == 0.0)
+    soon = in_sensor_noise(estimator, replace(base, x=0.02 * base.x))  # within a row
+    assert soon.tracks[0].lead == 2
+    assert np.all(np.isfinite(soon.innovations([(h, base.x)])[0]))
     left = [misfit(own, h, own.fit(h, base.x, iterations=12).x) for own in (all_rows, known)]
     assert left[1] < 1.5
     assert left[0] > 3.0 * left[1]
