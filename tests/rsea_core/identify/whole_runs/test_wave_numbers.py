@@ -53,7 +53,7 @@ def test_a_screening_at_the_sizes_found_puts_the_true_number_first(searched):
     assert again[0].law is named(searched, 12)
 
 
-def test_a_wave_of_a_neighbouring_number_gives_way_to_the_true_one_with_its_harmonic(searched):
+def test_a_wave_of_a_neighbouring_number_is_replaced_by_the_true_one_with_its_harmonic(searched):
     own, plain, wrong = searched.own, searched.plain, named(searched, 14)
     c = screen(own, plain, [wrong])[0]
     fit = fitted(own, plain, c, factors=(1.0, 0.3, 0.1))
