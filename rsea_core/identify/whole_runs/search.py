@@ -142,6 +142,8 @@ class WholeSearch:
         a wave of 14 with its harmonic than 14 alone: a screening about parameters that are far
         off does not tell which it is.
         """
+        if not alike(law, self.laws) and not self.richer_of(law):
+            return
         own, tried, taken = self.own, {law.key}, law
         base = without(own, self.fit, law)
         number = [self.with_harmonic(law, self.fit, base)]
@@ -159,10 +161,15 @@ class WholeSearch:
             self.replaced(taken, best, say)
             taken, number = best.law, []
 
+    def richer_of(self, law: Law) -> list[Law]:
+        """Laws that are tried only in place of one with a number that no fit changes."""
+        forms = [w for w in self.laws if w.follows and w.law in law.richer and holds(w, law)]
+        return forms if _fixed(law) else []
+
     def with_harmonic(self, law: Law, fit: Estimate, base: Estimate) -> tuple | None:
         """A law of a fixed number, and its fit with a further wave; None where it has none."""
-        forms = [w for w in self.laws if w.follows and w.law in law.richer and holds(w, law)]
-        if not forms or not _fixed(law):
+        forms = self.richer_of(law)
+        if not forms:
             return None
         known = self.own.problem.values(fit.hypothesis, fit.x)[1][fit.hypothesis.laws.index(law)]
         others = (other_values(self.own, fit, law), base.x)
@@ -337,7 +344,7 @@ def alike(law: Law, laws: Sequence[Law]) -> list[Law]:
         numbers = _fixed(other)
         names = [p.name for p in other.unknowns] == [p.name for p in law.unknowns]
         same = (other.effect, other.sensor) == (law.effect, law.sensor) and names
-        if fixed and same and numbers != fixed:
+        if fixed and same and numbers != fixed and numbers.keys() == fixed.keys():
             found.append((sum(abs(numbers[name] - fixed[name]) for name in fixed), other))
     return [other for _, other in sorted(found, key=lambda f: f[0])]
 
