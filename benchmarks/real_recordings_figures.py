@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.real_recordings_drift import drift_rows
+from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.cross_validation import cross_validate, fit_windows, windowed
@@ -54,7 +55,7 @@ class Diagnosed:
     def __init__(self, case: Case, folder: Path):
         self.case, self.problem = case, Problem(case, step_s=1e-3)
         self.model = FoundModel.from_toml(folder / "model.toml")
-        known = catalogue(case)
+        known = laws_by_key() | catalogue(case)  # an amplifier's offset is no candidate
         laws = [(known[law.key], values) for law, values in self.model.laws]
         self.hypothesis = Hypothesis(laws=tuple(law for law, _ in laws))
         starts = [
