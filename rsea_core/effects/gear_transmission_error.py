@@ -117,8 +117,8 @@ HARMONIC = {"": "", "2_": "second_", "3_": "third_"}
 def _write(v: Values, d: TrialMachine, w: RunConditions) -> None:
     """Position error once and twice per turn of wheel and worm, thrice per turn of the worm.
 
-    It counts from where the angles read zero: a spring is slack there, but for an offset of the
-    encoders, whose zeros nobody sets where the gear's error is zero.
+    It counts from where the angles read zero. There the spring is slack, but for an offset: the
+    zeros of the encoders need not be where the gear's error is zero.
     """
     at_zero = 0.0
     for part, wave, amplitude, phase in HARMONICS:
@@ -199,7 +199,7 @@ class GearTransmissionError(Term):
         1.0,
         unit="-",
         bounds=(1.0, 1e4),
-        source="eccentricity 1, ovality 2, a part that is held by three screws 3",
+        source="1: eccentricity; 2: ovality; 3: distortion by three screws",
         free=False,
         meaning="Periods of that error in a turn of the wheel.",
     )
@@ -222,7 +222,7 @@ class GearTransmissionError(Term):
         unit="rad (at the wheel)",
         bounds=(-0.05, 0.05),
         source="where the encoders' zeros were set; a fit",
-        meaning="Lost angle where the angles read zero.",
+        meaning="Position error where the angles read zero.",
     )
     wheel_second_amplitude_rad: float = _amplitude("wheel", 2, "ovality; a fit")
     wheel_second_phase_rad: float = _phase("wheel", 2)

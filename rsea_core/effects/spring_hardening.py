@@ -59,9 +59,10 @@ class SpringHardening(Term):
     """A stiffness that grows (or falls) with the deflection: K d + k_2 |d| d + k_3 d^3.
 
     k_2 = K s (r - 1)/(2 0.15) and k_3 = K (1 - s) (r - 1)/(3 0.15^2) for the ratio r of the
-    tangents at 0.15 rad and at zero, and a share s: 0 is the cubic of Duffing, 1 the square of
-    antagonistic springs of variable stiffness (Migliore et al., ICRA 2005). Beyond `up_to_rad`, or
-    where a softening spring has a quarter of its stiffness left, it goes on straight.
+    tangents at 0.15 rad and at zero, and a share s: 0 is Duffing's cubic spring, 1 a
+    quadratic spring, as in joints of variable stiffness (Migliore, Brown & DeWeerth, ICRA 2005).
+    Beyond `up_to_rad`, or where a softening spring has a quarter of its stiffness left, the law is
+    a straight line.
 
     Raises
     ------
@@ -91,7 +92,7 @@ class SpringHardening(Term):
         unit="rad",
         bounds=(1e-9, 1e9),
         source="the largest deflection of the recordings; the bench's 0.3 rad",
-        meaning="Deflection up to which the law is a polynomial; beyond it it is a straight line.",
+        meaning="Deflection up to which the law is a polynomial; beyond it a straight line.",
         default=UP_TO_rad,
     )
 

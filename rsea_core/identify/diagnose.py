@@ -106,10 +106,10 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
 def _is_doubtful(found: Diagnosis) -> bool:
     """Whether the laws found leave innovations that depend on each other, and predict less well.
 
-    Laws that leave nothing but the sensors' noise of whole recordings are in no doubt.
+    Complete laws (docs/diagnosis.md 10.4) are in no doubt.
     """
-    search = getattr(found.conclusion, "found", None)
-    if search is not None and search.complete and search.explained == 1.0:
+    search = found.conclusion.found
+    if search.complete and search.explained == 1.0:
         return False
     dependent = found.conclusion.estimator.tempering < DOUBTED_SHARE
     return dependent and held_out_error(found) > PREDICTED

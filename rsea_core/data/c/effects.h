@@ -89,7 +89,8 @@ static double rsea_gear_error(double wheel) {
 }
 static double rsea_gear_error_slope(double wheel) {
     const double worm = GEAR_RATIO * wheel;
-    return E_wheel_error_cycles * E_wheel_error * cos(E_wheel_error_cycles * wheel + E_wheel_error_phase)
+    return E_wheel_error_cycles * E_wheel_error
+        * cos(E_wheel_error_cycles * wheel + E_wheel_error_phase)
         + GEAR_RATIO * E_worm_error * cos(worm + E_worm_error_phase)
         + 2.0 * E_wheel_error_2 * cos(2.0 * wheel + E_wheel_error_2_phase)
         + 2.0 * GEAR_RATIO * E_worm_error_2 * cos(2.0 * worm + E_worm_error_2_phase)

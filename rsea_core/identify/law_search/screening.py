@@ -175,9 +175,10 @@ def screen_again(
 ) -> list[Candidate]:
     """Candidates screened at the sizes that a first screening found.
 
-    A machine that turns freely answers the sizes of the first one out of proportion: it stops
-    in a well of a torque that is ten times too large, and the column says nothing of the law. What
-    is no wave has sizes that act otherwise, as a threshold does: there the better one stands.
+    A machine that turns freely does not respond in proportion to a torque that is ten times too
+    large: it stops at a detent, and the column says nothing of the law. Sizes of laws without a
+    sine and a cosine need not act in proportion, as a threshold does not: of these the better
+    screening counts.
     """
     known = {c.law.key: c.law for c in candidates}
     begun = [

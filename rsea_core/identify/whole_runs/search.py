@@ -138,9 +138,9 @@ class WholeSearch:
     def nearest_number(self, law: Law, say) -> None:
         """Take a law's like with another fixed number, or with its harmonic, that leaves less.
 
-        A wave of 13 cycles in a turn follows most of what one of 12 does, and one of 16 more of
-        a wave of 14 with its harmonic than 14 alone: a screening about parameters that are far
-        off does not tell which it is.
+        13 cycles in a turn explain most of what 12 do, and 16 explain more than 14 alone of 14
+        cycles with their harmonic: a screening about parameters that are far off does not tell
+        which number is right.
         """
         if not alike(law, self.laws) and not self.richer_of(law):
             return
@@ -272,11 +272,14 @@ class WholeSearch:
                 others = {(w.effect, w.sensor) for w in self.taken if w is not law}
                 near = [
                     t.candidate for t in best_of_each_effect(trials)
-                    if (t.law.effect, t.law.sensor) not in others
+                    if (t.law.effect, t.law.sensor) not in others and t.law is not law
                 ]  # fmt: skip
-                trials = self.fitted(without(self.own, self.fit, law), near[:WHOLE_RIVALS])
-            if not trials:
-                continue
+                less = without(self.own, self.fit, law)
+                gain = less.cost - self.fit.cost - PER_VALUE * count_values(law)
+                mine = next(t for t in trials if t.law is law)
+                own = replace(mine, fit=self.fit, gain=gain, left=self.left())
+                found = [own, *self.fitted(less, near[: WHOLE_RIVALS - 1])]
+                trials = sorted(found, key=lambda t: -t.gain)
             best = _plainest(trials, self.doubt())
             if best.law is not law:
                 say(f"  whole recordings: {best.law.key} in place of {law.key}")
