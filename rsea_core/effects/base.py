@@ -323,6 +323,7 @@ def require_bounds(term: Term) -> None:
         low, high = info.bounds
         inside = isinstance(info.value, int | float) and low <= info.value <= high
         if not inside or not math.isfinite(info.value):
+            unit = "" if info.unit == "-" else f" {info.unit}"
             raise TermError(
-                f"{term.effect}: {name} = {info.value} is outside [{low}, {high}] {info.unit}"
+                f"{term.effect}: {name} = {info.value} is outside [{low}, {high}]{unit}"
             )

@@ -100,7 +100,7 @@ class DriveDeadZone(Term):
     headline: ClassVar[str] = "The drive has a dead zone: small commands have no effect."
     figure_units: ClassVar[Mapping[str, str]] = {"width_duty": "-"}
     curve: ClassVar = EffectCurve(
-        title="Dead zone of the drive", x_label="duty asked for", y_label="duty that acts",
+        title="Dead zone of the drive", x_label="command", y_label="command that acts",
         over="command", evaluate=lambda d, v, x: _acting_commands(d.fx, x),
     )  # fmt: skip
     relevant: ClassVar = RelevantSize(
@@ -153,7 +153,7 @@ class DriveDeadZone(Term):
     def sentence(cls, f: FigureText) -> str:
         """The width."""
         width = f.figures["width_duty"]
-        return f"a dead zone of the drive, commands below {width:.3g} (duty of 1, V, A or Nm)"
+        return f"a dead zone of the drive, {width:.3g} in the unit of the command"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -101,13 +101,13 @@ def report_data(
 
 
 def _in_linear_units(page: Any, key: str = "") -> Any:
-    """The page with metres and newtons as units and in the labels of axes."""
+    """The page with metres and newtons as units, in labels of axes and in sentences on shapes."""
     if isinstance(page, dict):
         return {name: _in_linear_units(value, name) for name, value in page.items()}
     if isinstance(page, (list, tuple)):
         return type(page)(_in_linear_units(value, key) for value in page)
-    is_unit = isinstance(page, str) and (key == "unit" or key.endswith("label"))
-    return linear_units(page) if is_unit else page
+    is_text = key in ("unit", "sentence", "signatures") or key.endswith("label")
+    return linear_units(page) if is_text and isinstance(page, str) else page
 
 
 def _is_mapped(conclusion: Conclusion, verdict: str, place: str | None) -> bool:

@@ -64,7 +64,7 @@ def test_parameters_carry_unit_bounds_source_and_anchor():
 
 
 def test_term_parameters_outside_their_bounds_are_named():
-    with pytest.raises(TermError, match=r"torque_scale = 0.01 is outside \[0.1, 10.0\] -"):
+    with pytest.raises(TermError, match=r"torque_scale = 0.01 is outside \[0.1, 10.0\]"):
         SpringCurve(deflection_rad=D, torque_Nm=T, torque_scale=0.01)
     with pytest.raises(TermError, match="torque_scale = nan is outside"):
         SpringCurve(deflection_rad=D, torque_Nm=T, torque_scale=float("nan"))
