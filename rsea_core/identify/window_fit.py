@@ -112,7 +112,8 @@ def late_command(judged) -> dict | None:
         std = judged.spread.std[at] * law.unknowns[0].scale
         row = max(t.experiment.recording.sample_time_s for t in judged.estimator.tracks)
         latest = law.unknowns[0].high - 1e-3 * row
-        if DELAY_ROWS * row < delay < latest and delay > 5.0 * std:
+        of_log = (1.0 + 0.5 * judged.problem.timing.linear) * row  # linear: half a row of hold
+        if DELAY_ROWS * row < delay < latest and delay - of_log > 5.0 * std:
             return {
                 "name": law.effect, "subsystem": "drive", "confidence": 0.95,
                 "law": law.law, "class": [law.effect], "alternatives": [],

@@ -24,7 +24,14 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator, independ
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect
-from rsea_core.identify.whole_runs.sensor_noise import excess, in_sensor_noise, misfit, well_fitted
+from rsea_core.identify.whole_runs.sensor_noise import (
+    excess,
+    in_noise_left_by,
+    in_sensor_noise,
+    is_coloured,
+    misfit,
+    well_fitted,
+)
 from rsea_core.identify.whole_runs.unseen import needed, predicts_unseen, without
 
 
@@ -43,13 +50,11 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         Where none does: the one law that leaves little more, for where windows show nothing.
     """
     own = in_sensor_noise(found.base_estimator, found.base)
-    plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
-    left = misfit(own, plain.hypothesis, plain.x)
-    if left > SOUND:
-        plain = well_fitted(own, plain)
-        left = misfit(own, plain.hypothesis, plain.x)
+    plain, left = _parameters_alone(own, found.base)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
+    if left <= INCOMPLETE and is_coloured(found.base_estimator):
+        own, plain, left = _in_less_noise(found, own, plain, say)
     if not INCOMPLETE < left < np.inf:
         return found, None
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
@@ -71,6 +76,33 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         if other.complete or (its_nearly is not None and nearly is None):
             return other, its_nearly
     return found, nearly
+
+
+def _parameters_alone(own: Estimator, fit: Estimate) -> tuple[Estimate, float]:
+    """Parameters alone fitted to whole recordings, and their misfit."""
+    plain = own.fit(fit.hypothesis, fit.x, iterations=12)
+    left = misfit(own, plain.hypothesis, plain.x)
+    if left > SOUND:
+        plain = well_fitted(own, plain)
+        left = misfit(own, plain.hypothesis, plain.x)
+    return plain, left
+
+
+def _in_less_noise(
+    found: Found, own: Estimator, plain: Estimate, say
+) -> tuple[Estimator, Estimate, float]:
+    """Whole recordings in the noise that the best law leaves, parameters alone, and their misfit.
+
+    Coloured noise estimated beside parameters alone may be what a law lacks: a late reading.
+    """
+    search = WholeSearch(own, plain, found, laws_of(found), COMPLETE)
+    trials = search.trials()
+    if not trials:
+        return own, plain, 0.0
+    own = in_noise_left_by(own, trials[0].fit)
+    plain, left = _parameters_alone(own, plain)
+    say(f"  whole recordings: in the noise beside {trials[0].law.key} parameters leave {left:.2f}")
+    return own, plain, left
 
 
 def _other_timing(search: WholeSearch) -> CommandTiming | None:

@@ -46,8 +46,7 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
     for t in with_windows(estimator, None):
         t = _without_lead(t, late_s)
         noise, readings = t.noise, t.noise.readings
-        row_s = t.block * t.experiment.recording.sample_time_s
-        if noise.colours.size and noise.colour_time_s < SENSOR_COLOUR_ROWS * row_s:
+        if _of_sensor(t):
             readings = np.hypot(readings, noise.colours)
         inputs, colours = SENSORS_ALONE * noise.inputs, 0.0 * noise.colours
         noise = replace(noise, inputs=inputs, readings=readings, colours=colours)
@@ -55,6 +54,37 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
     own = estimator.having(tracks)
     own.tempering = 1.0
     return own
+
+
+def _of_sensor(t: Track) -> bool:
+    """Whether the colour of a track's readings is short enough to be the sensor's own."""
+    row_s = t.block * t.experiment.recording.sample_time_s
+    return bool(t.noise.colours.size and t.noise.colour_time_s < SENSOR_COLOUR_ROWS * row_s)
+
+
+def is_coloured(estimator: Estimator) -> bool:
+    """Whether coloured noise, which may be what a law lacks, is most of a reading's noise."""
+    return any(
+        _of_sensor(t) and np.any(t.noise.colours > t.noise.readings) for t in estimator.tracks
+    )
+
+
+def in_noise_left_by(own: Estimator, fit: Estimate) -> Estimator:
+    """Another estimator, the noise of each reading no larger than the errors that a fit leaves.
+
+    Where the noise was estimated beside a law that lacks, it holds what this law explains.
+    """
+    left: dict[str, list[float]] = {}
+    for t, e in zip(own.tracks, own.innovations([(fit.hypothesis, fit.x)]), strict=True):
+        for name, mean in zip(
+            t.experiment.channels, np.mean(huber_squares(e[0]), axis=0), strict=True
+        ):
+            left.setdefault(name, []).append(float(np.sqrt(mean)))
+    tracks = []
+    for t in own.tracks:
+        share = np.array([min(1.0, max(left[name])) for name in t.experiment.channels])
+        tracks.append(prepared(t, noise=replace(t.noise, readings=share * t.noise.readings)))
+    return own.having(tracks)
 
 
 def _delay_s(estimator: Estimator, fit: Estimate) -> float:
