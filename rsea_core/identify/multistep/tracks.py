@@ -263,6 +263,8 @@ def scale_of(e: Experiment) -> Scale:
         load = max(load, float(np.std(r["torque_Nm"])))
     if plant.structure not in (mp.ELASTIC_FREE, mp.RIGID_FREE):
         load = gear
+    if plant.structure == mp.RIGID_FREE:  # one body: an external torque is as large as the drive's
+        load = max(load, gear)
     return Scale(
         torque_Nm=np.array([gear or load or 1e-12, load or gear or 1e-12]),
         voltage_V=volts, speed_rad_per_s=speed, angle_rad=angle, time_s=time,
