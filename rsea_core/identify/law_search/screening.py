@@ -88,7 +88,7 @@ class Projection:
         e = np.concatenate([each.ravel() for each in innovations])
         return (e * self.root) + self.target
 
-    def judged(self, columns: NDArray, signed: bool) -> tuple | None:
+    def judged(self, columns: NDArray) -> tuple | None:
         """Size (k,), gain, held-out gain and its deviation of columns (k, n)."""
         if not np.all(np.isfinite(columns)) or not np.any(columns):
             return None
@@ -98,8 +98,6 @@ class Projection:
         G = G + 1e-9 * np.trace(G) * np.eye(len(G)) + 1e-30 * np.eye(len(G))
         h = columns @ self.left
         size = np.linalg.solve(G, h)
-        if not signed and size[0] <= 0.0:
-            return None
         gain = 0.5 * float(h @ size)
         count = self.blocks[-1] + 1
         k = len(columns)
@@ -126,8 +124,17 @@ def _block_of_each(tracks: Sequence[Track]) -> NDArray:
     return np.concatenate(found)
 
 
-def screen(estimator: Estimator, fit: Estimate, laws: Sequence[Law]) -> list[Candidate]:
-    """Candidates, the largest held-out gain first; no laws that follow another one."""
+def screen(
+    estimator: Estimator, fit: Estimate, laws: Sequence[Law], *, wrong_signs: bool = False
+) -> list[Candidate]:
+    """Candidates, the largest held-out gain first; no laws that follow another one.
+
+    Parameters
+    ----------
+    wrong_signs : bool
+        Laws that would have to act against their sign too, with no gain: about parameters that
+        have taken up what a law does, its sign may be the other one.
+    """
     laws = [law for law in laws if not law.follows]
     problem, projection = estimator.problem, Projection(estimator, fit)
     n = len(problem.nominals)
@@ -154,10 +161,14 @@ def screen(estimator: Estimator, fit: Estimate, laws: Sequence[Law]) -> list[Can
         for start in law.starts:
             turned = quarter_turn(law, start)
             pair = [columns[law.key, s] for s in (start, turned) if s is not None]
-            judged = projection.judged(np.array(pair), law.signed or turned is not None)
+            judged = projection.judged(np.array(pair))
             if judged is None:
                 continue
             size, gain, held_out, deviation = judged
+            if not law.signed and turned is None and size[0] <= 0.0:
+                if not wrong_signs:
+                    continue
+                size, gain, held_out = np.abs(size), 0.0, 0.0
             scale = float(np.hypot(*size)) if turned is not None else float(size[0])
             begun = _mixed(law, start, size) if turned is not None else start
             candidate = Candidate(

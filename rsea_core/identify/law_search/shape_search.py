@@ -83,7 +83,7 @@ def shapes(projection: Projection) -> list[Shape]:
                     part.append(response(t, port, scale * np.interp(v, nodes, height)))
                 moved = [e + c for e, c in zip(projection.level, part, strict=True)]
                 columns.append(projection.column(moved))
-            judged = projection.judged(np.array(columns), True)
+            judged = projection.judged(np.array(columns))
             if judged is None:
                 continue
             size, gain, held_out, deviation = judged

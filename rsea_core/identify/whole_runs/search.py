@@ -223,7 +223,8 @@ class WholeSearch:
         """Candidates fitted beside what was taken, best first."""
         have = {(law.effect, law.sensor) for law in self.taken}
         left = [w for w in self.laws if (w.effect, w.sensor) not in have]
-        screened = screen_again(self.own, self.fit, screen(self.own, self.fit, left))
+        screened = screen(self.own, self.fit, left, wrong_signs=True)
+        screened = screen_again(self.own, self.fit, screened)
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
         candidates = _most_promising(screened) + self.of_many_starts(left)
@@ -306,7 +307,7 @@ class WholeSearch:
 def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
     """Of each effect and reading the best laws and the one with the fewest values."""
     forms: dict[tuple, list[Candidate]] = {}
-    for c in sorted(screened, key=lambda c: -c.gain):
+    for c in sorted((c for c in screened if c.gain > 0.0), key=lambda c: -c.gain):
         forms.setdefault((c.law.effect, c.law.sensor), []).append(c)
     found = []
     for laws in forms.values():
