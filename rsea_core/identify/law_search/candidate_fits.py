@@ -6,9 +6,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.effects.variant import Law
+from rsea_core.identify.fitting.peak_temperature import peak_rise_K
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import (
@@ -20,6 +22,7 @@ from rsea_core.identify.multistep.criteria import (
     FAR_FROM_RIG,
     FASTEST,
     MOST_OF_ONE,
+    MOST_RISE_K,
     MOVES,
     NEAR,
     NEARLY_ABSENT,
@@ -268,8 +271,16 @@ def _equal_shares(share: NDArray, least: int) -> NDArray:
 
 
 def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
-    """Whether a value of the last law ran into a bound that is not its absence."""
-    return bool(values_at_bound(problem, fit, law))
+    """Whether a value of the last law ran into a bound that is not its absence.
+
+    A winding that no insulation would bear is such a bound: a resistance that grows with its heat
+    runs away, and what is left of the torque then follows any mismatch.
+    """
+    if values_at_bound(problem, fit, law):
+        return True
+    if law.effect != DriveThermal.effect:
+        return False
+    return not peak_rise_K(problem, fit.hypothesis, fit.x, problem.benches) < MOST_RISE_K
 
 
 def values_at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> tuple[str, ...]:

@@ -29,6 +29,7 @@ from rsea_core.identify.judgement.unmodelled_gravity import (
 )
 from rsea_core.identify.judgement.verdict import confidence, rivals, verdict_of
 from rsea_core.identify.locate.unknown_input_test import unmodelled_input_detected
+from rsea_core.identify.multistep.criteria import MOST_RISE_K
 from rsea_core.identify.selection.common_scale_factor import (
     constants_phrase,
     named_scale,
@@ -226,6 +227,8 @@ class Conclusion:
         rise = 0.0
         if law.effect == DriveThermal.effect:
             rise = peak_rise_K(self.problem, hypothesis, x, self._warmed)
+            if not rise < MOST_RISE_K:  # the test's commands are beyond what the motor bears
+                rise = peak_rise_K(self.problem, hypothesis, x, self.problem.benches)
         values = laws[j]
         # what mass and offset have taken of an unbalance belongs to it
         if law.effect == LoadUnbalance.effect:
