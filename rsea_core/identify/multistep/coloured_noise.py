@@ -18,6 +18,7 @@ from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.multistep.noise_estimate import estimated_noise
 from rsea_core.identify.multistep.tracks import Track, prepared
 
+SHORTER = 3.0  # units by which a longer time constant must be likelier
 SMALLER = 0.1  # unknown inputs beside which coloured noise is looked for too
 
 
@@ -42,7 +43,7 @@ def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say)
                 estimated_noise([_coloured(t, time, share) for t in estimator.tracks], residuals)
             )
             likelihood = _likelihood(own, h, x)
-            if likelihood > least:
+            if likelihood > least + (SHORTER if best is not estimator else 0.0):
                 best, least = own, likelihood
     if best is not estimator:
         gain = least - _likelihood(estimator, h, x)

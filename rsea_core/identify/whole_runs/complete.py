@@ -189,8 +189,9 @@ def _without_needless(
 
 
 def _enough(left: float) -> float:
-    """Misfit that is as good as none, by what parameters alone leave."""
-    return max(COMPLETE, COMPLETE_SHARE * left)
+    """Misfit that is as good as none, by what parameters alone leave: most is explained."""
+    most = float(np.sqrt(1.0 + (1.0 - EXPLAINED) * max(left**2 - 1.0, 0.0)))
+    return max(min(COMPLETE, most), COMPLETE_SHARE * left)
 
 
 def _complete(found: Found, search: WholeSearch) -> Found:

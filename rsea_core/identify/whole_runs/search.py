@@ -38,6 +38,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.whole_runs.sensor_noise import excess, misfit, well_fitted
 from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
 
+ARRIVING = 60  # iterations at most, of the law that is taken: its valley may be flat
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
 
 
@@ -101,7 +102,8 @@ class WholeSearch:
         best = trials[0]
         say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
         self.first = self.first or trials
-        self.fit = well_fitted(self.own, best.fit)
+        fit = self.own.fit(best.fit.hypothesis, best.fit.x, iterations=ARRIVING)
+        self.fit = well_fitted(self.own, fit)
         self.taken.append(best.law)
         self.rivals[best.law.key] = trials
         self.nearest_number(best.law, say)
@@ -281,12 +283,27 @@ class WholeSearch:
                 own = replace(mine, fit=self.fit, gain=gain, left=self.left())
                 found = [own, *self.fitted(less, near[: WHOLE_RIVALS - 1])]
                 trials = sorted(found, key=lambda t: -t.gain)
+            else:
+                trials = self.arrived(law, trials)
             best = _plainest(trials, self.doubt())
             if best.law is not law:
                 say(f"  whole recordings: {best.law.key} in place of {law.key}")
             self.fit = best.fit
             self.taken = [w for w in self.taken if w is not law] + [best.law]
             self.rivals[best.law.key] = trials
+
+    def arrived(self, law: Law, trials: Sequence[Trial]) -> list[Trial]:
+        """Trials of one law alone, the law's as it was refined and its close rivals fitted on."""
+        near = [t for t in best_of_each_effect(trials) if t.gain > CLOSE_TO_BEST * trials[0].gain]
+        found = []
+        for t in trials:
+            fit = self.fit if t.law is law else t.fit
+            if t in near[:WHOLE_RIVALS] and t.law is not law:
+                fit = self.own.fit(fit.hypothesis, fit.x, iterations=ARRIVING)
+            gain = self.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
+            left = misfit(self.own, fit.hypothesis, fit.x)
+            found.append(replace(t, fit=fit, gain=gain, left=left))
+        return sorted(found, key=lambda t: -t.gain)
 
     def predict(self, say) -> None:
         """Take out laws that do not predict rows which they were not fitted to."""
