@@ -15,6 +15,8 @@ from rsea_core.identify.fitting.predictions import numbers_of
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
 from rsea_core.recordings.case import read_test
 
+MOST_RISE_K = 300.0  # of a winding over ambient: no insulation bears more (class C: 240 C and up)
+
 
 def benches_with_test(problem: Problem, ambient_C: float) -> list[Bench]:
     """The recordings, and the test's inputs after them where the case holds some (contract)."""
@@ -56,3 +58,11 @@ def peak_rise_K(
         _, states = bench.replay.run(numbers, with_states=True)
         peak = max(peak, float(states[:, WINDING_RISE].max()))
     return peak
+
+
+def bearable_rise_K(
+    problem: Problem, hypothesis: Hypothesis, x: NDArray, benches: Sequence[Bench]
+) -> float:
+    """Peak rise, of the problem's recordings alone where the test is beyond what a motor bears."""
+    rise = peak_rise_K(problem, hypothesis, x, benches)
+    return rise if rise < MOST_RISE_K else peak_rise_K(problem, hypothesis, x, problem.benches)

@@ -10,7 +10,7 @@ from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.effects.variant import Law
-from rsea_core.identify.fitting.peak_temperature import peak_rise_K
+from rsea_core.identify.fitting.peak_temperature import MOST_RISE_K, peak_rise_K
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import (
@@ -22,7 +22,6 @@ from rsea_core.identify.multistep.criteria import (
     FAR_FROM_RIG,
     FASTEST,
     MOST_OF_ONE,
-    MOST_RISE_K,
     MOVES,
     NEAR,
     NEARLY_ABSENT,

@@ -62,7 +62,6 @@ LEAST_RATIO = 2.5  # of the gain to its deviation between stretches of rows
 FASTEST = 0.3  # cycles per row: a faster motion is not seen
 FAR_FROM_RIG = 2.0  # tolerances from which values are fitted once more from the rig's
 STRAINED = 2.5  # tolerances: a value beyond is bent by what the model lacks
-MOST_RISE_K = 300.0  # of a winding over ambient: no insulation bears more (class C: 240 C and up)
 CLOSE_TO_RIG = 1.0  # tolerance that such a value may move in a fit beside the rig file
 WITHIN_ROW = 0.02  # of a row: a change of the winding's time constant that rows cannot tell
 UNBELIEVED = 4.5  # tolerances: a value beyond, and no law, is no correction

@@ -10,7 +10,7 @@ from rsea_core.effects.base import Context
 from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
+from rsea_core.identify.fitting.peak_temperature import bearable_rise_K, benches_with_test
 from rsea_core.identify.fitting.problem import Bench, Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, listed_rivals, nearest
 from rsea_core.identify.judgement.covariance import Spread, between_laws, covariance
@@ -29,7 +29,6 @@ from rsea_core.identify.judgement.unmodelled_gravity import (
 )
 from rsea_core.identify.judgement.verdict import confidence, rivals, verdict_of
 from rsea_core.identify.locate.unknown_input_test import unmodelled_input_detected
-from rsea_core.identify.multistep.criteria import MOST_RISE_K
 from rsea_core.identify.selection.common_scale_factor import (
     constants_phrase,
     named_scale,
@@ -226,9 +225,7 @@ class Conclusion:
         )
         rise = 0.0
         if law.effect == DriveThermal.effect:
-            rise = peak_rise_K(self.problem, hypothesis, x, self._warmed)
-            if not rise < MOST_RISE_K:  # the test's commands are beyond what the motor bears
-                rise = peak_rise_K(self.problem, hypothesis, x, self.problem.benches)
+            rise = bearable_rise_K(self.problem, hypothesis, x, self._warmed)
         values = laws[j]
         # what mass and offset have taken of an unbalance belongs to it
         if law.effect == LoadUnbalance.effect:

@@ -284,26 +284,13 @@ class WholeSearch:
                 found = [own, *self.fitted(less, near[: WHOLE_RIVALS - 1])]
                 trials = sorted(found, key=lambda t: -t.gain)
             else:
-                trials = self.arrived(law, trials)
+                trials = _arrived(self, law, trials)
             best = _plainest(trials, self.doubt())
             if best.law is not law:
                 say(f"  whole recordings: {best.law.key} in place of {law.key}")
             self.fit = best.fit
             self.taken = [w for w in self.taken if w is not law] + [best.law]
             self.rivals[best.law.key] = trials
-
-    def arrived(self, law: Law, trials: Sequence[Trial]) -> list[Trial]:
-        """Trials of one law alone, the law's as it was refined and its close rivals fitted on."""
-        near = [t for t in best_of_each_effect(trials) if t.gain > CLOSE_TO_BEST * trials[0].gain]
-        found = []
-        for t in trials:
-            fit = self.fit if t.law is law else t.fit
-            if t in near[:WHOLE_RIVALS] and t.law is not law:
-                fit = self.own.fit(fit.hypothesis, fit.x, iterations=ARRIVING)
-            gain = self.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
-            left = misfit(self.own, fit.hypothesis, fit.x)
-            found.append(replace(t, fit=fit, gain=gain, left=left))
-        return sorted(found, key=lambda t: -t.gain)
 
     def predict(self, say) -> None:
         """Take out laws that do not predict rows which they were not fitted to."""
@@ -376,6 +363,20 @@ def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
     for t in trials:
         found.setdefault((t.law.effect, t.law.sensor), t)
     return list(found.values())
+
+
+def _arrived(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[Trial]:
+    """Trials of one law alone, the law's as it was refined and its close rivals fitted on."""
+    near = [t for t in best_of_each_effect(trials) if t.gain > CLOSE_TO_BEST * trials[0].gain]
+    found = []
+    for t in trials:
+        fit = search.fit if t.law is law else t.fit
+        if t.law is not law and any(t is other for other in near[:WHOLE_RIVALS]):
+            fit = search.own.fit(fit.hypothesis, fit.x, iterations=ARRIVING)
+        gain = search.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
+        left = misfit(search.own, fit.hypothesis, fit.x)
+        found.append(replace(t, fit=fit, gain=gain, left=left))
+    return sorted(found, key=lambda t: -t.gain)
 
 
 def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
