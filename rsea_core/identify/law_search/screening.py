@@ -176,7 +176,7 @@ def screen(
                 size=1.0 if turned is not None else scale,
             )  # fmt: skip
             old = best.get(law.key)
-            if old is None or held_out > old.held_out:
+            if old is None or (gain > 0.0, held_out) > (old.gain > 0.0, old.held_out):
                 best[law.key] = candidate
     return sorted(best.values(), key=lambda c: -c.held_out)
 

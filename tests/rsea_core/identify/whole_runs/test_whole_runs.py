@@ -10,11 +10,14 @@ from rsea_core.effects.spring_parallel import SpringParallel, StiffeningParallel
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import settled
 from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.screening import screen
+from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.criteria import COMPLETE, INCOMPLETE
 from rsea_core.identify.multistep.horizons import parameters_with_timing, with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
-from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit
+from rsea_core.identify.whole_runs.sensor_noise import in_noise_left_by, in_sensor_noise, misfit
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 
@@ -65,6 +68,33 @@ def test_a_spring_that_a_slow_torque_hides_is_found_from_whole_recordings(sprung
     assert values["stiffness_Nm_per_rad"] == pytest.approx(0.004, rel=0.1)
     own = in_sensor_noise(sprung.base_estimator)
     assert misfit(own, found.best.hypothesis, found.best.x) < COMPLETE
+
+
+def test_noise_that_held_a_law_falls_to_what_the_law_leaves(sprung, completed):
+    own = in_sensor_noise(sprung.base_estimator)
+    loud = own.having(
+        [prepared(t, noise=replace(t.noise, readings=30.0 * t.noise.readings)) for t in own.tracks]
+    )
+    less = in_noise_left_by(loud, completed.best)
+    left = misfit(own, completed.best.hypothesis, completed.best.x)
+    assert left < 2.0
+    for t, first in zip(less.tracks, own.tracks, strict=True):
+        # the error of a reading below Huber's bound is a square, as almost all here are
+        assert t.noise.readings == pytest.approx(left * first.noise.readings, rel=0.1)
+    kept = in_noise_left_by(own, sprung.base)  # more than noise is left: it stays
+    for t, first in zip(kept.tracks, own.tracks, strict=True):
+        assert t.noise.readings == pytest.approx(first.noise.readings, rel=1e-12)
+
+
+def test_a_law_of_the_wrong_sign_is_screened_without_gain_where_asked(sound):
+    own, laws = sound.base_estimator, laws_of(sound)
+    usual = {c.law.key: c.gain for c in screen(own, sound.base, laws)}
+    every = {c.law.key: c.gain for c in screen(own, sound.base, laws, wrong_signs=True)}
+    more = every.keys() - usual.keys()
+    assert more
+    assert all(every[key] == 0.0 for key in more)
+    assert {law.signed for law in laws if law.key in more} == {False}
+    assert {key: every[key] for key in usual} == usual
 
 
 def test_what_no_prediction_shows_is_no_number(sound):
