@@ -153,6 +153,12 @@ class Recording(ColumnViews, BriefRepr):
         """The first reading of a column, 0 where it is absent."""
         return float(self.columns[name][0]) if name in self.columns else 0.0
 
+    def held_angle_rad(self) -> float:
+        """The mean angle of a locked load, the first one of another; 0 where none is read."""
+        if self.load.kind == "locked" and "load_angle_rad" in self.columns:
+            return float(np.mean(self.columns["load_angle_rad"]))
+        return self.first("load_angle_rad")
+
 
 def read_recording(
     path: str | Path,

@@ -212,7 +212,7 @@ def crude_motion(e: Experiment) -> NDArray:
         motion[:, k.IM] = r["current_A"]
     plant = machine_of(e.base)
     if plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
-        motion[:, k.TL], motion[:, k.WL] = r.first("load_angle_rad"), 0.0
+        motion[:, k.TL], motion[:, k.WL] = r.held_angle_rad(), 0.0
     return motion
 
 
@@ -304,7 +304,7 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
         motion[:, k.TL : k.WL + 1] = motion[:, k.TW : k.WW + 1]
         spread[:, k.TL : k.WL + 1] = spread[:, k.TW : k.WW + 1]
     elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
-        motion[:, k.TL], motion[:, k.WL] = e.recording.first("load_angle_rad"), 0.0
+        motion[:, k.TL], motion[:, k.WL] = e.recording.held_angle_rad(), 0.0
     # what no reading shows, an angle where only speeds are logged, is not known ever less
     spread = np.minimum(spread, WIDEST * _extent(track.scale, track.motion))
     return replace(track, motion=motion, motion_std=spread)

@@ -1,4 +1,4 @@
-"""What is free in a case's experiments: dampings that the rig file leaves out."""
+"""What is free in a case's experiments, and where a locked load stands."""
 
 from dataclasses import replace
 
@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.multistep.experiment import DAMPED, MultistepProblem
+from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
-from tests.cases.one_axis import ROW_s, axis_case, axis_recording
+from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig
 
 RATIO, CONSTANT, OHM = 70.0, 0.008, 3.0
 SERVO = Rig(
@@ -41,3 +42,15 @@ def test_a_damping_left_out_may_be_as_large_as_that_of_the_back_emf_on_the_same_
     stiff = replace(SERVO, motor_inertia_kgm2=5e-5)
     ratio = load_damping(tmp_path, stiff, "current_command_A") / by_current
     assert ratio == pytest.approx((1e-3 + 5e-5 * RATIO**2) / whole)
+
+
+def test_a_locked_load_stands_at_the_mean_of_its_readings(tmp_path):
+    plain = axis_recording(seed=6)
+    noise = np.random.default_rng(7).normal(0.0, 2e-3, plain.rows)
+    columns = {**plain.columns, "load_angle_rad": 0.3 + noise}
+    locked = replace(plain, columns=columns, load=Load(kind="locked"))
+    assert locked.held_angle_rad() == pytest.approx(0.3, abs=4.0 * 2e-3 / plain.rows**0.5)
+    free = replace(locked, load=Load(kind="free"))
+    assert free.held_angle_rad() == columns["load_angle_rad"][0]
+    (found,) = MultistepProblem(axis_case(tmp_path, locked, rig=axis_rig())).fitted
+    assert found.replay.inputs.initial_load_angle_rad == locked.held_angle_rad()
