@@ -8,6 +8,7 @@ import pytest
 from rsea_core.identify.multistep.experiment import DAMPED, MultistepProblem
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
+from rsea_core.model.actuator_model import ActuatorModel
 from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig
 
 RATIO, CONSTANT, OHM = 70.0, 0.008, 3.0
@@ -53,4 +54,5 @@ def test_a_locked_load_stands_at_the_mean_of_its_readings(tmp_path):
     free = replace(locked, load=Load(kind="free"))
     assert free.held_angle_rad() == columns["load_angle_rad"][0]
     (found,) = MultistepProblem(axis_case(tmp_path, locked, rig=axis_rig())).fitted
-    assert found.replay.inputs.initial_load_angle_rad == locked.held_angle_rad()
+    run = found.replay.run(ActuatorModel(axis_rig()))
+    assert run[:, 1] == pytest.approx(locked.held_angle_rad(), abs=1e-12)
