@@ -69,7 +69,10 @@ class HeldOut:
 
 
 def held_out(found: Found) -> HeldOut | None:
-    """Gain of the laws over parameters alone on rows held out; None where there are none."""
+    """Gain of the laws over parameters alone on rows held out; None where there are none.
+
+    Complete laws have predicted the last rows of each recording before (`whole_runs/unseen.py`).
+    """
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     own, gain, ratio = found.estimator, 0.0, 0.0
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
@@ -79,6 +82,8 @@ def held_out(found: Found) -> HeldOut | None:
         gain = own.tempering * (_power(before) - _power(after))
         if np.isfinite(gain):
             ratio = even_ratio(others[1], before, after)
+    if found.complete and not unseen:
+        return None
     if abs(gain) < SILENT:  # recordings that do not move what the laws are about
         shortened = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
         trials = [(h, shortened.fit(h, x, iterations=6).x) for h, x in trials]
