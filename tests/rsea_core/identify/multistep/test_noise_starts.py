@@ -31,7 +31,7 @@ def scattered(tmp_path_factory):
 
 
 @pytest.mark.parametrize("torque_share", [1.0, 10.0])
-def test_noise_begun_at_the_encoders_floor_beside_large_torques_ends_at_the_scatter(
+def test_noise_begun_at_the_encoders_floor_with_large_torques_ends_at_the_scatter(
     scattered, torque_share
 ):
     tracks, residuals = scattered
