@@ -21,7 +21,6 @@ from rsea_core.numeric.threads import share_out
 MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would pass for it
 SLOW_INPUT = 3  # of the unknown inputs
 NOISE_STEPS = (3.0, 1.8, 1.3)
-QUIETER = (1.0, 0.1, 0.01)  # of unknown torques: starts beside noise of the fastest changes
 NOISE_BLOCKS, NOISE_LEAST = 4000, 250  # averaged rows that noise is estimated from
 
 
@@ -52,11 +51,10 @@ def estimated_noise(
         keys += [("colour", c) for c in read]
     noises = [t.noise for t in tracks]
     values = _likelihoods(parts, noises)
-    for share in QUIETER:
-        trial = [_of_fast_changes(p, share) for p in parts]
-        found = _likelihoods(parts, trial)
-        if sum(found) > sum(values):
-            values, noises = found, trial
+    trial = [_of_fast_changes(p) for p in parts]
+    found = _likelihoods(parts, trial)
+    if sum(found) > sum(values):
+        values, noises = found, trial
     for factor in steps:
         for key in keys:
             for up in (factor, 1.0 / factor):
@@ -120,16 +118,15 @@ def _block(track: Track, residual: NDArray, length: int) -> _Block:
     return _Block(track=track, rows=rows, residual=left)
 
 
-def _of_fast_changes(part: _Block, share: float) -> Noise:
-    """Readings as noisy as third differences of what is left, and a share of unknown torques.
+def _of_fast_changes(part: _Block) -> Noise:
+    """Readings as noisy as third differences of what is left, beside the same unknown torques.
 
     Third differences of white noise have 20 times its variance, and those of a motion are small.
     """
     noise = part.track.noise
     left = np.diff(part.residual, n=3, axis=0)
     size = np.median(np.abs(left), axis=0) / (0.6745 * 20.0**0.5) if len(left) else 0.0
-    inputs = np.concatenate([share * noise.inputs[:SLOW_INPUT], noise.inputs[SLOW_INPUT:]])
-    return replace(noise, inputs=inputs, readings=np.maximum(noise.readings, size))
+    return replace(noise, readings=np.maximum(noise.readings, size))
 
 
 def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
