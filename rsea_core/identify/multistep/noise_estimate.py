@@ -1,5 +1,7 @@
 """Noise of the greatest likelihood: sizes of unknown inputs and of the readings' noise."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -21,6 +23,7 @@ from rsea_core.numeric.threads import share_out
 MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would pass for it
 SLOW_INPUT = 3  # of the unknown inputs
 NOISE_STEPS = (3.0, 1.8, 1.3)
+QUIETER = (1.0, 0.1, 0.01)  # of unknown torques: starts beside noise of the fastest changes
 NOISE_BLOCKS, NOISE_LEAST = 4000, 250  # averaged rows that noise is estimated from
 
 
@@ -51,10 +54,21 @@ def estimated_noise(
         keys += [("colour", c) for c in read]
     noises = [t.noise for t in tracks]
     values = _likelihoods(parts, noises)
-    trial = [_of_fast_changes(p) for p in parts]
-    found = _likelihoods(parts, trial)
-    if sum(found) > sum(values):
-        values, noises = found, trial
+    ends = [_descended(parts, tracks, keys, steps, values, noises)]
+    starts = [[_of_fast_changes(p, share) for p in parts] for share in QUIETER]
+    likely = [_likelihoods(parts, trial) for trial in starts]
+    best = max(range(len(starts)), key=lambda j: sum(likely[j]))
+    if sum(likely[best]) > sum(values):
+        ends.append(_descended(parts, tracks, keys, steps, likely[best], starts[best]))
+    _, noises = max(ends, key=lambda end: end[0])
+    return [prepared(t, noise=n) for t, n in zip(tracks, noises, strict=True)]
+
+
+def _descended(
+    parts: Sequence[_Block], tracks: Sequence[Track], keys: Sequence[tuple],
+    steps: Sequence[float], values: list[float], noises: list[Noise],
+) -> tuple[float, list[Noise]]:  # fmt: skip
+    """Likelihood and noises where one size after the other, from a start, gains no more."""
     for factor in steps:
         for key in keys:
             for up in (factor, 1.0 / factor):
@@ -67,7 +81,7 @@ def estimated_noise(
                     values, noises, moved = found, trial, True
                 if moved:
                     break
-    return [prepared(t, noise=n) for t, n in zip(tracks, noises, strict=True)]
+    return sum(values), noises
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,15 +132,16 @@ def _block(track: Track, residual: NDArray, length: int) -> _Block:
     return _Block(track=track, rows=rows, residual=left)
 
 
-def _of_fast_changes(part: _Block) -> Noise:
-    """Readings as noisy as third differences of what is left, beside the same unknown torques.
+def _of_fast_changes(part: _Block, share: float) -> Noise:
+    """Readings as noisy as third differences of what is left, and a share of unknown torques.
 
     Third differences of white noise have 20 times its variance, and those of a motion are small.
     """
     noise = part.track.noise
     left = np.diff(part.residual, n=3, axis=0)
     size = np.median(np.abs(left), axis=0) / (0.6745 * 20.0**0.5) if len(left) else 0.0
-    return replace(noise, readings=np.maximum(noise.readings, size))
+    inputs = np.concatenate([share * noise.inputs[:SLOW_INPUT], noise.inputs[SLOW_INPUT:]])
+    return replace(noise, inputs=inputs, readings=np.maximum(noise.readings, size))
 
 
 def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
