@@ -22,7 +22,7 @@ from rsea_core.recordings.case import Case
 BENCH_ROW_s = 2.5e-3
 BENCH_RATIO = 20.0
 BENCH_COLUMNS = ("motor_angle_rad", "load_angle_rad")
-BETTER = 0.95  # error of free runs over the other's, recordings fitted and held out alike
+BETTER = 0.95  # free-run error over the other's, fitted and held-out recordings with equal weight
 PREDICTED = 0.02  # of the spread of recordings held out: no other search is needed below
 
 

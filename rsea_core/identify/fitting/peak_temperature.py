@@ -15,7 +15,7 @@ from rsea_core.identify.fitting.predictions import numbers_of
 from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
 from rsea_core.recordings.case import read_test
 
-MOST_RISE_K = 300.0  # of a winding over ambient: no insulation bears more (class C: 240 C and up)
+MOST_RISE_K = 300.0  # of a winding over ambient; the highest thermal class of IEC 60085 is 250 C
 
 
 def benches_with_test(problem: Problem, ambient_C: float) -> list[Bench]:
@@ -60,9 +60,9 @@ def peak_rise_K(
     return peak
 
 
-def bearable_rise_K(
+def reported_rise_K(
     problem: Problem, hypothesis: Hypothesis, x: NDArray, benches: Sequence[Bench]
 ) -> float:
-    """Peak rise, of the problem's recordings alone where the test is beyond what a motor bears."""
+    """Peak rise over all benches; without the test, where it would exceed the limit."""
     rise = peak_rise_K(problem, hypothesis, x, benches)
     return rise if rise < MOST_RISE_K else peak_rise_K(problem, hypothesis, x, problem.benches)

@@ -272,8 +272,8 @@ def _equal_shares(share: NDArray, least: int) -> NDArray:
 def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
     """Whether a value of the last law ran into a bound that is not its absence.
 
-    A winding that no insulation would bear is such a bound: a resistance that grows with its heat
-    runs away, and what is left of the torque then follows any mismatch.
+    A winding above `MOST_RISE_K` counts as such: its resistance grows with its temperature without
+    limit (thermal runaway), and the law can then follow any mismatch.
     """
     if values_at_bound(problem, fit, law):
         return True

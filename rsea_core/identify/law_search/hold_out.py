@@ -71,7 +71,7 @@ class HeldOut:
 def held_out(found: Found) -> HeldOut | None:
     """Gain of the laws over parameters alone on rows held out; None where there are none.
 
-    Complete laws have predicted the last rows of each recording before (`whole_runs/unseen.py`).
+    Complete laws were tested on the last rows of each recording (`whole_runs/unseen.py`).
     """
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     own, gain, ratio = found.estimator, 0.0, 0.0

@@ -132,8 +132,8 @@ def screen(
     Parameters
     ----------
     wrong_signs : bool
-        Laws that would have to act against their sign too, with no gain: about parameters that
-        have taken up what a law does, its sign may be the other one.
+        Also laws whose linearised size is negative where only a positive one is physical, with
+        no gain: parameters biased by the missing law can turn its sign.
     """
     laws = [law for law in laws if not law.follows]
     problem, projection = estimator.problem, Projection(estimator, fit)

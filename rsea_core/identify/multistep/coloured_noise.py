@@ -18,7 +18,7 @@ from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.multistep.noise_estimate import estimated_noise
 from rsea_core.identify.multistep.tracks import Track, prepared
 
-SHORTER = 3.0  # units by which a longer time constant must be likelier
+SHORTER = 3.0  # log-likelihood by which a later trial must be better: short time constants first
 SMALLER = 0.1  # unknown inputs beside which coloured noise is looked for too
 
 
@@ -43,7 +43,7 @@ def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say)
                 estimated_noise([_coloured(t, time, share) for t in estimator.tracks], residuals)
             )
             likelihood = _likelihood(own, h, x)
-            if likelihood > least + (SHORTER if best is not estimator else 0.0):
+            if likelihood > least + (0.0 if best is estimator else SHORTER):
                 best, least = own, likelihood
     if best is not estimator:
         gain = least - _likelihood(estimator, h, x)

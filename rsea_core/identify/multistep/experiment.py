@@ -171,7 +171,7 @@ def experiment(
     if "motor_angle_rad" not in r and "load_angle_rad" in r:
         ratio = model.rig.gear_ratio or 1.0
         inputs = replace(inputs, initial_motor_angle_rad=ratio * r.first("load_angle_rad"))
-    # the noise of one reading of a locked load would be a torque on its spring
+    # the noise of one reading would deflect the spring of a locked load
     inputs = replace(inputs, initial_load_angle_rad=r.held_angle_rad())
     more = {}
     for name, needed in (("drive_enabled", r.command_name), ("supply_V", r.command_name == "duty")):

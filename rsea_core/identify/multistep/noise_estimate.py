@@ -1,7 +1,5 @@
 """Noise of the greatest likelihood: sizes of unknown inputs and of the readings' noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -23,7 +21,7 @@ from rsea_core.numeric.threads import share_out
 MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would pass for it
 SLOW_INPUT = 3  # of the unknown inputs
 NOISE_STEPS = (3.0, 1.8, 1.3)
-QUIETER = (1.0, 0.1, 0.01)  # of unknown torques: starts beside noise of the fastest changes
+QUIETER = (1.0, 0.1, 0.01)  # unknown torques of the second search's starts, over the first's
 NOISE_BLOCKS, NOISE_LEAST = 4000, 250  # averaged rows that noise is estimated from
 
 
@@ -34,8 +32,9 @@ def estimated_noise(
 
     One coordinate after the other, in steps that become finer: the likelihood is smooth and a
     factor of 1.3 in a density changes nothing that is decided with it. A part of each recording
-    is enough for so few numbers. The readings' noise may also begin at the size of the fastest
-    changes: coordinates alone do not leave a minimum in which an unknown torque drives every row.
+    is enough for so few numbers. A second search begins with the readings' noise at the size of the
+    fastest changes: the first does not leave a local maximum in which an unknown torque drives
+    every row.
     """
     total = sum(t.blocks for t in tracks)
     parts = [
@@ -54,34 +53,14 @@ def estimated_noise(
         keys += [("colour", c) for c in read]
     noises = [t.noise for t in tracks]
     values = _likelihoods(parts, noises)
-    ends = [_descended(parts, tracks, keys, steps, values, noises)]
+    results = [_descended(parts, tracks, keys, steps, values, noises)]
     starts = [[_of_fast_changes(p, share) for p in parts] for share in QUIETER]
     likely = [_likelihoods(parts, trial) for trial in starts]
     best = max(range(len(starts)), key=lambda j: sum(likely[j]))
     if sum(likely[best]) > sum(values):
-        ends.append(_descended(parts, tracks, keys, steps, likely[best], starts[best]))
-    _, noises = max(ends, key=lambda end: end[0])
+        results.append(_descended(parts, tracks, keys, steps, likely[best], starts[best]))
+    _, noises = max(results, key=lambda result: result[0])
     return [prepared(t, noise=n) for t, n in zip(tracks, noises, strict=True)]
-
-
-def _descended(
-    parts: Sequence[_Block], tracks: Sequence[Track], keys: Sequence[tuple],
-    steps: Sequence[float], values: list[float], noises: list[Noise],
-) -> tuple[float, list[Noise]]:  # fmt: skip
-    """Likelihood and noises where one size after the other, from a start, gains no more."""
-    for factor in steps:
-        for key in keys:
-            for up in (factor, 1.0 / factor):
-                moved = False
-                for _ in range(12):
-                    trial = [_scaled(t, n, key, up) for t, n in zip(tracks, noises, strict=True)]
-                    found = _likelihoods(parts, trial)
-                    if not sum(found) > sum(values) + 0.1:
-                        break
-                    values, noises, moved = found, trial, True
-                if moved:
-                    break
-    return sum(values), noises
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,6 +92,26 @@ class _Block:
         return -0.5 * float(np.sum(huber_squares(out))) + determinant
 
 
+def _descended(
+    parts: Sequence[_Block], tracks: Sequence[Track], keys: Sequence[tuple],
+    steps: Sequence[float], values: list[float], noises: list[Noise],
+) -> tuple[float, list[Noise]]:  # fmt: skip
+    """Likelihood and noises after a coordinate search from given noises."""
+    for factor in steps:
+        for key in keys:
+            for up in (factor, 1.0 / factor):
+                moved = False
+                for _ in range(12):
+                    trial = [_scaled(t, n, key, up) for t, n in zip(tracks, noises, strict=True)]
+                    found = _likelihoods(parts, trial)
+                    if not sum(found) > sum(values) + 0.1:
+                        break
+                    values, noises, moved = found, trial, True
+                if moved:
+                    break
+    return sum(values), noises
+
+
 def _likelihoods(parts: Sequence[_Block], noises: Sequence[Noise]) -> list[float]:
     """Log-likelihood of each part under its noise, on threads."""
     found = [0.0] * len(parts)
@@ -133,9 +132,9 @@ def _block(track: Track, residual: NDArray, length: int) -> _Block:
 
 
 def _of_fast_changes(part: _Block, share: float) -> Noise:
-    """Readings as noisy as third differences of what is left, and a share of unknown torques.
+    """Noise of readings by third differences of the residual, and a share of unknown torques.
 
-    Third differences of white noise have 20 times its variance, and those of a motion are small.
+    Third differences of white noise have 20 times its variance; those of a smooth motion are small.
     """
     noise = part.track.noise
     left = np.diff(part.residual, n=3, axis=0)

@@ -263,7 +263,7 @@ def scale_of(e: Experiment) -> Scale:
         load = max(load, float(np.std(r["torque_Nm"])))
     if plant.structure not in (mp.ELASTIC_FREE, mp.RIGID_FREE):
         load = gear
-    if plant.structure == mp.RIGID_FREE:  # one body: an external torque is as large as the drive's
+    if plant.structure == mp.RIGID_FREE:  # one body: an external torque can be as large
         load = max(load, gear)
     return Scale(
         torque_Nm=np.array([gear or load or 1e-12, load or gear or 1e-12]),

@@ -10,7 +10,7 @@ from rsea_core.effects.base import Context
 from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.peak_temperature import bearable_rise_K, benches_with_test
+from rsea_core.identify.fitting.peak_temperature import benches_with_test, reported_rise_K
 from rsea_core.identify.fitting.problem import Bench, Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, listed_rivals, nearest
 from rsea_core.identify.judgement.covariance import Spread, between_laws, covariance
@@ -225,7 +225,7 @@ class Conclusion:
         )
         rise = 0.0
         if law.effect == DriveThermal.effect:
-            rise = bearable_rise_K(self.problem, hypothesis, x, self._warmed)
+            rise = reported_rise_K(self.problem, hypothesis, x, self._warmed)
         values = laws[j]
         # what mass and offset have taken of an unbalance belongs to it
         if law.effect == LoadUnbalance.effect:

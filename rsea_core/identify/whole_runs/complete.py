@@ -93,15 +93,16 @@ def _in_less_noise(
 ) -> tuple[Estimator, Estimate, float]:
     """Whole recordings in the noise that the best law leaves, parameters alone, and their misfit.
 
-    Coloured noise estimated beside parameters alone may be what a law lacks: a late reading.
+    Coloured noise estimated with parameters alone may be the error of a missing law, as of a late
+    reading.
     """
     search = WholeSearch(own, plain, found, laws_of(found), COMPLETE)
     trials = search.trials()
     if not trials:
-        return own, plain, 0.0
+        return own, plain, found.left_by_parameters
     own = in_noise_left_by(own, trials[0].fit)
     plain, left = _parameters_alone(own, plain)
-    say(f"  whole recordings: in the noise beside {trials[0].law.key} parameters leave {left:.2f}")
+    say(f"  whole recordings: in the noise left by {trials[0].law.key} parameters leave {left:.2f}")
     return own, plain, left
 
 
@@ -189,7 +190,7 @@ def _without_needless(
 
 
 def _enough(left: float) -> float:
-    """Misfit that is as good as none, by what parameters alone leave: most is explained."""
+    """Misfit below which laws are complete, by what parameters alone leave."""
     most = float(np.sqrt(1.0 + (1.0 - EXPLAINED) * max(left**2 - 1.0, 0.0)))
     return max(min(COMPLETE, most), COMPLETE_SHARE * left)
 

@@ -38,7 +38,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.whole_runs.sensor_noise import excess, misfit, well_fitted
 from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
 
-ARRIVING = 60  # iterations at most, of the law that is taken: its valley may be flat
+CONVERGED = 60  # iterations at most, of the law that is taken: its minimum may be flat
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
 
 
@@ -102,7 +102,7 @@ class WholeSearch:
         best = trials[0]
         say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
         self.first = self.first or trials
-        fit = self.own.fit(best.fit.hypothesis, best.fit.x, iterations=ARRIVING)
+        fit = self.own.fit(best.fit.hypothesis, best.fit.x, iterations=CONVERGED)
         self.fit = well_fitted(self.own, fit)
         self.taken.append(best.law)
         self.rivals[best.law.key] = trials
@@ -271,7 +271,9 @@ class WholeSearch:
         """Each law against its rivals beside the others; the plainest of those alike is taken."""
         for law in tuple(self.taken):
             trials = self.rivals[law.key]
-            if len(self.taken) > 1:  # they were fitted beside other laws
+            mine = next(t for t in trials if t.law is law)
+            alone = len(self.plain.hypothesis.laws) + 1
+            if max(len(self.fit.hypothesis.laws), len(mine.fit.hypothesis.laws)) > alone:
                 others = {(w.effect, w.sensor) for w in self.taken if w is not law}
                 near = [
                     t.candidate for t in best_of_each_effect(trials)
@@ -279,12 +281,11 @@ class WholeSearch:
                 ]  # fmt: skip
                 less = without(self.own, self.fit, law)
                 gain = less.cost - self.fit.cost - PER_VALUE * count_values(law)
-                mine = next(t for t in trials if t.law is law)
                 own = replace(mine, fit=self.fit, gain=gain, left=self.left())
                 found = [own, *self.fitted(less, near[: WHOLE_RIVALS - 1])]
                 trials = sorted(found, key=lambda t: -t.gain)
             else:
-                trials = _arrived(self, law, trials)
+                trials = _converged(self, law, trials)
             best = _plainest(trials, self.doubt())
             if best.law is not law:
                 say(f"  whole recordings: {best.law.key} in place of {law.key}")
@@ -365,14 +366,14 @@ def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
     return list(found.values())
 
 
-def _arrived(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[Trial]:
-    """Trials of one law alone, the law's as it was refined and its close rivals fitted on."""
+def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[Trial]:
+    """Trials of single laws: the law's refined fit, and its close rivals fitted to convergence."""
     near = [t for t in best_of_each_effect(trials) if t.gain > CLOSE_TO_BEST * trials[0].gain]
     found = []
     for t in trials:
         fit = search.fit if t.law is law else t.fit
         if t.law is not law and any(t is other for other in near[:WHOLE_RIVALS]):
-            fit = search.own.fit(fit.hypothesis, fit.x, iterations=ARRIVING)
+            fit = search.own.fit(fit.hypothesis, fit.x, iterations=CONVERGED)
         gain = search.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
         left = misfit(search.own, fit.hypothesis, fit.x)
         found.append(replace(t, fit=fit, gain=gain, left=left))

@@ -63,7 +63,7 @@ def _of_sensor(t: Track) -> bool:
 
 
 def is_coloured(estimator: Estimator) -> bool:
-    """Whether coloured noise, which may be what a law lacks, is most of a reading's noise."""
+    """Whether most of a reading's noise is coloured, which may be the error of a missing law."""
     return any(
         _of_sensor(t) and np.any(t.noise.colours > t.noise.readings) for t in estimator.tracks
     )
@@ -72,7 +72,7 @@ def is_coloured(estimator: Estimator) -> bool:
 def in_noise_left_by(own: Estimator, fit: Estimate) -> Estimator:
     """Another estimator, the noise of each reading no larger than the errors that a fit leaves.
 
-    Where the noise was estimated beside a law that lacks, it holds what this law explains.
+    Noise that was estimated while a law was missing includes the error that this law explains.
     """
     left: dict[str, list[float]] = {}
     for t, e in zip(own.tracks, own.innovations([(fit.hypothesis, fit.x)]), strict=True):
