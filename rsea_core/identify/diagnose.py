@@ -14,7 +14,7 @@ import numpy as np
 
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
-from rsea_core.identify.multistep.criteria import DOUBTED_SHARE
+from rsea_core.identify.multistep.criteria import DOUBTED_SHARE, NEEDS_NO_WINDOWS
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.recordings.case import Case
@@ -116,7 +116,7 @@ def _is_doubtful(found: Diagnosis) -> bool:
     Complete laws (docs/diagnosis.md 10.4) are in no doubt.
     """
     search = found.conclusion.found
-    if search.complete and search.explained == 1.0:
+    if search.complete and search.explained > NEEDS_NO_WINDOWS:
         return False
     dependent = found.conclusion.estimator.tempering < DOUBTED_SHARE
     return dependent and held_out_error(found) > PREDICTED

@@ -16,7 +16,12 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
 from rsea_core.identify.law_search.hold_out import with_moving_loads
 from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
-from rsea_core.identify.multistep.criteria import DOUBTED_ERROR, DOUBTED_SHARE, TIMING_SHARE
+from rsea_core.identify.multistep.criteria import (
+    DOUBTED_ERROR,
+    DOUBTED_SHARE,
+    NEEDS_NO_WINDOWS,
+    TIMING_SHARE,
+)
 from rsea_core.identify.multistep.horizons import likelier, relative_error, with_better_timing
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
 from rsea_core.recordings.case import Case
@@ -39,6 +44,8 @@ def investigate(
     nearly = None
     if not quick:
         found, nearly = with_whole_runs(found, say)
+        if nearly is not None and nearly.explained > NEEDS_NO_WINDOWS:
+            found = nearly
     if not (found.complete or found.sound):
         add_all(found, laws_of(found), say, quick=quick)
         found = _in_doubt(case, found, say, quick=quick)

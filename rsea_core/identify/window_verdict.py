@@ -87,7 +87,7 @@ class WindowVerdict(Conclusion):
         h = self.fit.hypothesis
         self.error = relative_error(self.estimator, h, self.fit.x)
         self.unknown_torque = unknown_torque(self.estimator, self.error)
-        self.unpredicted = self.error > NO_PREDICTION and not found.sound
+        self.unpredicted = self.error > NO_PREDICTION and not (found.sound or found.complete)
         self.no_further = not found.complete and (error_left_beyond(found) or 0.0) > NOT_BEYOND
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = late_command(self)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
@@ -72,7 +73,8 @@ class Found:
     complete : bool
         Whether laws stand by whole recordings: they leave nothing but that noise, or little more.
     explained : float
-        Share of what parameters alone leave beyond that noise, which complete laws explain.
+        Share of what parameters alone leave beyond that noise, which complete laws explain, of all
+        rows and of rows unseen.
     """
 
     problem: MultistepProblem
@@ -96,6 +98,11 @@ class Found:
     def sound(self) -> bool:
         """Whether parameters alone predict whole recordings to the sensors' noise."""
         return self.left_by_parameters < SOUND
+
+    @property
+    def acts_once(self) -> bool:
+        """Whether all laws are a torque that acted once: recordings without it cannot test it."""
+        return all(step.law.effect == LoadDisturbance.effect for step in self.steps)
 
     @property
     def predicts_longer(self) -> bool:

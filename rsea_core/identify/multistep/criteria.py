@@ -86,6 +86,7 @@ LEFT_OF_EACH = 0.9  # of the misfit: a law that leaves more of it is none that c
 FITTED_ROWS = 0.6  # of each recording; a law must predict the others
 UNPREDICTED = 0.5  # of what parameters alone leave of those: laws that leave more say nothing
 EXPLAINED = 0.85  # of what parameters leave, all rows and unseen ones: a law that is nearly all
+NEEDS_NO_WINDOWS = 0.95  # of the same: a law that stands without a search in windows
 NEIGHBOURS = 4  # of a law with a fixed number, as cycles in a turn: tried in its place
 MANY_STARTS = 20  # of a law: the one that windows show is a start too
 QUICK_ITERATIONS, CLOSE_TO_BEST = 3, 0.5  # of laws that a screening puts last; of the best gain

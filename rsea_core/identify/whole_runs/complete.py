@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.search import begun, laws_of
@@ -32,7 +31,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     misfit,
     well_fitted,
 )
-from rsea_core.identify.whole_runs.unseen import needed, predicts_unseen, without
+from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
 
 def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Found | None]:
@@ -132,7 +131,9 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
         if explained < EXPLAINED:
             continue
         predicts, ratio = needed(own, trial.fit, trial.law, plain)
-        if predicts and predicts_unseen(found, own, trial.fit, plain, say, 1.0 - EXPLAINED):
+        unseen = unseen_share(found, own, trial.fit, plain, say) if predicts else np.inf
+        explained = min(explained, 1.0 - unseen)
+        if explained > EXPLAINED:
             say(f"  whole recordings: {trial.law.key} explains {explained:.2f} of what is left")
             search.fit, search.taken = trial.fit, [trial.law]
             search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
@@ -154,12 +155,10 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     h = found.best.hypothesis
     fit = own.fit(h, found.best.x, iterations=12)
     left = misfit(own, h, fit.x) if found.steps else np.inf
-    laws = [step.law for step in found.steps]
     if nearly is not None:
         best = nearly.best
         # a torque that acts once is flexible: it must leave clearly less than a lasting law
-        once = all(law.effect == LoadDisturbance.effect for law in laws)
-        share = 1.0 / LEFT_OF_EACH if once else LEFT_OF_EACH
+        share = 1.0 / LEFT_OF_EACH if found.acts_once else LEFT_OF_EACH
         if misfit(own, best.hypothesis, best.x) < share * left:
             return nearly
     if not found.steps:

@@ -30,13 +30,14 @@ from rsea_core.identify.multistep.criteria import (
     PULSES,
     QUICK_ITERATIONS,
     RIVAL_SCALE,
+    UNPREDICTED,
     WHOLE_FORMS,
     WHOLE_RIVALS,
     WHOLE_TRIED,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.whole_runs.sensor_noise import excess, misfit, well_fitted
-from rsea_core.identify.whole_runs.unseen import needed, other_values, predicts_unseen, without
+from rsea_core.identify.whole_runs.unseen import needed, other_values, unseen_share, without
 
 CONVERGED = 60  # iterations at most, of the law that is taken: its minimum may be flat
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
@@ -306,7 +307,11 @@ class WholeSearch:
     def complete(self, say) -> bool:
         """Whether the laws leave nothing but noise, and predict rows unseen."""
         enough = bool(self.taken) and self.left() <= self.enough
-        return enough and predicts_unseen(self.found, self.own, self.fit, self.plain, say)
+        return enough and self.unseen_share(say) < UNPREDICTED
+
+    def unseen_share(self, say) -> float:
+        """What the fit leaves of rows unseen, over what parameters alone leave there."""
+        return unseen_share(self.found, self.own, self.fit, self.plain, say)
 
 
 def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:

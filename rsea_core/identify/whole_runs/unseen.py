@@ -22,12 +22,11 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 
 
-def predicts_unseen(
-    found: Found, own: Estimator, fit: Estimate, plain: Estimate, say, most: float = UNPREDICTED
-) -> bool:
-    """Whether a fit predicts rows that it was not made of, by most of what parameters alone leave.
+def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, say) -> float:
+    """What a fit leaves of rows that it was not made of, over what parameters alone leave there.
 
-    Recordings held out must not be predicted worse than by parameters alone.
+    inf where recordings held out are predicted worse than by parameters alone, unless all that the
+    fit adds is a torque that acted once, in another recording.
 
     Parameters
     ----------
@@ -37,22 +36,21 @@ def predicts_unseen(
         Of whole recordings in the sensors' noise.
     plain : Estimate
         Parameters alone.
-    most : float
-        Share of what they leave of the unseen rows, that the fit may leave.
     """
     before, after = (max(_left_unseen(own, f), 0.0) for f in (plain, fit))
     share = after / before if before > 0.0 else 1.0
     say(f"  whole recordings: of rows unseen {share:.2f} of what parameters leave remains")
-    if share >= most:
-        return False
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
-    if not unseen:
-        return True
+    added = [law for law in fit.hypothesis.laws if law not in plain.hypothesis.laws]
+    if share >= UNPREDICTED or not unseen:
+        return share
+    if all(law.effect == LoadDisturbance.effect for law in added):
+        return share
     like = replace(found, estimator=own, horizon=None)
     costs = []
     for trial in ((fit.hypothesis, fit.x), (plain.hypothesis, plain.x)):
         costs.append(_cost(of_recordings(like, unseen, trial, None), *trial))
-    return costs[0] < costs[1]
+    return share if costs[0] < costs[1] else np.inf
 
 
 def needed(own: Estimator, fit: Estimate, law: Law, less: Estimate) -> tuple[bool, float]:

@@ -13,7 +13,7 @@ from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
-from rsea_core.identify.whole_runs.unseen import needed, predicts_unseen, without
+from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 
@@ -50,13 +50,13 @@ def test_a_law_of_the_machine_predicts_unseen_rows_evenly(sprung, true_law):
     predicts, ratio = needed(own, true_law, true_law.hypothesis.laws[-1], plain)
     assert predicts
     assert ratio > 10.0
-    assert predicts_unseen(found, own, true_law, plain, lambda text: None, 0.05)
+    assert unseen_share(found, own, true_law, plain, lambda text: None) < 0.05
 
 
 def test_a_torque_that_acts_once_does_not_predict_what_a_spring_does(sprung, pulse):
     found, own, plain = sprung
     assert pulse.cost < plain.cost - 100.0  # as a fit, it is worth much
-    assert not predicts_unseen(found, own, pulse, plain, lambda text: None, 0.3)
+    assert unseen_share(found, own, pulse, plain, lambda text: None) > 0.3
 
 
 def test_a_fit_without_a_law_is_that_of_the_others(sprung, true_law):
