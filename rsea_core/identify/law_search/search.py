@@ -82,6 +82,7 @@ from rsea_core.identify.multistep.horizons import (
     with_fine_steps,
 )
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER, nuisances
+from rsea_core.identify.multistep.mean_commands import with_mean_commands
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case
 
@@ -106,6 +107,7 @@ def begun(
         case, h, say, timing=timing, quick=quick or bool(mesh)
     )
     estimator, base = with_fine_steps(estimator, base, say, per_cycle=SEARCH_STEPS)
+    estimator = with_mean_commands(estimator, base)
     if not quick:
         estimator, base = settled(estimator, base)
     problem = estimator.problem

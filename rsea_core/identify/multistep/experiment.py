@@ -65,10 +65,13 @@ class EngineSteps(NamedTuple):
         Steps in the fastest cycle, at least; there is at least one in a row.
     fineness : float
         Factor on the step that this gives, for every recording.
+    in_row : int
+        Parts of a row, in each of which a command that moves linearly is held at its mean.
     """
 
     per_cycle: float = FIRST_STEPS
     fineness: float = 1.0
+    in_row: int = FINER
 
 
 FIRST = EngineSteps()
@@ -163,7 +166,6 @@ def experiment(
     timing: CommandTiming = AS_LOGGED, steps: EngineSteps = FIRST,
 ) -> Experiment:  # fmt: skip
     """A recording under a command that is held from row to row, or moves linearly."""
-    finer = FINER if timing.linear and r.load.kind != "imposed" and r.command_name else 1
     inputs = r.inputs()
     even = None if timing.rows is RowTimes.LOGGED else even_times(r.time_s)
     if even is not None:
@@ -173,22 +175,21 @@ def experiment(
         inputs = replace(inputs, initial_motor_angle_rad=ratio * r.first("load_angle_rad"))
     # the noise of one reading would deflect the spring of a locked load
     inputs = replace(inputs, initial_load_angle_rad=r.held_angle_rad())
-    more = {}
-    for name, needed in (("drive_enabled", r.command_name), ("supply_V", r.command_name == "duty")):
-        if name in r and needed:
-            more[name] = r[name]
-    if finer > 1:
-        inputs, more = between_rows(inputs, more, finer)
     floors = noise_floor(model.rig, r, order=4)
+    more, of_rows = {}, _columns_of_rows(r)
     if not r.initial_rest:
         speeds = start_speeds(r, model.rig.gear_ratio or 1.0, floors)
         more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)
-    replay = Replay.of(inputs, **more)
+    replay = Replay.of(inputs, **of_rows, **more)
     numbers = replay.numbers(model)
     cycle = _cycle_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
+    finer = 1
+    if timing.linear and r.load.kind != "imposed" and r.command_name:
+        finer = steps.in_row
+        inputs, of_rows = between_rows(inputs, of_rows, finer)
     step = float(np.clip(cycle / steps.per_cycle, LEAST_STEP_s, r.sample_time_s))
     step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
-    replay = Replay.of(inputs, step_s=steps.fineness * step, **more)
+    replay = Replay.of(inputs, step_s=steps.fineness * step, **of_rows, **more)
     channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
     channels += tuple(v for a, v in VELOCITIES.items() if v in r.responses and a not in r)
     require_comparable(r, channels)
@@ -201,6 +202,12 @@ def experiment(
         stiffness=model.rig.spring_stiffness_Nm_per_rad or 0.0, at_rest=begins_at_rest(r, floors),
         ahead_s=r.time_s - even if even is not None and timing.rows is RowTimes.READINGS else None,
     )  # fmt: skip
+
+
+def _columns_of_rows(r: Recording) -> dict[str, NDArray]:
+    """What else acts on the drive from row to row."""
+    needed = {"drive_enabled": r.command_name, "supply_V": r.command_name == "duty"}
+    return {name: r[name] for name, needs in needed.items() if needs and name in r}
 
 
 def _cycle_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:

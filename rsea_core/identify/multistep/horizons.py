@@ -280,13 +280,13 @@ def with_fine_steps(
     """
     h, steps = base.hypothesis, estimator.problem.steps
     if steps.per_cycle / steps.fineness < per_cycle:
-        estimator = _in_steps(estimator, EngineSteps(per_cycle))
+        estimator = in_steps(estimator, EngineSteps(per_cycle))
         base = estimator.fit(h, base.x)
     for _ in range(STEP_ROUNDS):
         steps = estimator.problem.steps
         half = steps._replace(fineness=0.5 * steps.fineness)
         before = estimator.innovations([(h, base.x)])
-        after = _in_steps(estimator, half).innovations([(h, base.x)])
+        after = in_steps(estimator, half).innovations([(h, base.x)])
         error = max(
             float(np.sqrt(np.mean((e - f) ** 2))) for e, f in zip(before, after, strict=True)
         )
@@ -295,7 +295,7 @@ def with_fine_steps(
         wanted = steps.fineness * np.sqrt(0.5 * STEP_ERROR / (RICHARDSON * error))
         finer = steps._replace(fineness=float(np.clip(wanted, LEAST_FINENESS, half.fineness)))
         say(f"steps moved the innovations by {error:.2g} deviations: {finer.fineness:.2g} of them")
-        estimator = _in_steps(estimator, finer)
+        estimator = in_steps(estimator, finer)
         estimator = with_noise(estimator, h, estimator.fit(h, base.x).x, steps=NOISE_STEPS)
         smooth(estimator, h, base.x)
         estimator = estimator.having([prepared(t) for t in estimator.tracks])
@@ -303,7 +303,7 @@ def with_fine_steps(
     return estimator, base
 
 
-def _in_steps(estimator: Estimator, steps: EngineSteps) -> Estimator:
+def in_steps(estimator: Estimator, steps: EngineSteps) -> Estimator:
     """The estimator with experiments in other steps."""
     problem = estimator.problem
     return with_problem(

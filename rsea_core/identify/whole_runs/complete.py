@@ -22,7 +22,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
-from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect
+from rsea_core.identify.whole_runs.search import Trial, WholeSearch, best_of_each_effect
 from rsea_core.identify.whole_runs.sensor_noise import (
     excess,
     in_noise_left_by,
@@ -57,10 +57,11 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     if not INCOMPLETE < left < np.inf:
         return found, None
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
-    while search.left() > search.enough and len(search.taken) < WHOLE_LAWS and search.add(say):
-        pass
-    if search.left() <= search.enough:
+    for _ in range(WHOLE_LAWS):
+        if search.left() <= search.enough or not search.add(say):
+            break
         search.prune(say)
+    if search.left() <= search.enough:
         search.refine(say)
         search.compare(say)
         search.predict(say)
@@ -126,7 +127,7 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
     excess_before = excess(own, plain.hypothesis, plain.x)
     if excess_before == 0.0:  # one reading is not predicted, and others better than their noise
         return None
-    for trial in search.first:
+    for trial in _alone(search):
         explained = 1.0 - excess(own, trial.fit.hypothesis, trial.fit.x) / excess_before
         if explained < EXPLAINED:
             continue
@@ -139,6 +140,20 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
             search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
             return replace(_complete(found, search), explained=explained)
     return None
+
+
+def _alone(search: WholeSearch) -> list[Trial]:
+    """Single laws beside parameters: the one that made all others needless, those tried first.
+
+    A fit that began beside another law may arrive where one from the start did not.
+    """
+    if len(search.taken) != 1:
+        return search.first
+    law = search.taken[0]
+    mine = next(t for t in search.rivals[law.key] if t.law is law)
+    gain = search.plain.cost - search.fit.cost - PER_VALUE * count_values(law)
+    mine = replace(mine, fit=search.fit, gain=gain, left=search.left())
+    return [mine, *(t for t in search.first if t.law is not law)]
 
 
 def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:

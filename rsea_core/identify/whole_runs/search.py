@@ -22,6 +22,7 @@ from rsea_core.identify.law_search.screening import Candidate, Projection, scree
 from rsea_core.identify.multistep.criteria import (
     CLOSE_TO_BEST,
     DOUBT,
+    HARDLY_MORE,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     MANY_STARTS,
@@ -33,9 +34,15 @@ from rsea_core.identify.multistep.criteria import (
     UNPREDICTED,
     WHOLE_FORMS,
     WHOLE_RIVALS,
-    WHOLE_TRIED,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.whole_runs.forms import (
+    alike,
+    holds,
+    most_promising,
+    of_other_effects,
+    richer_of,
+)
 from rsea_core.identify.whole_runs.sensor_noise import excess, misfit, well_fitted
 from rsea_core.identify.whole_runs.unseen import needed, other_values, unseen_share, without
 
@@ -145,7 +152,7 @@ class WholeSearch:
         cycles with their harmonic: a screening about parameters that are far off does not tell
         which number is right.
         """
-        if not alike(law, self.laws) and not self.richer_of(law):
+        if not alike(law, self.laws) and not richer_of(law, self.laws):
             return
         own, tried, taken = self.own, {law.key}, law
         base = without(own, self.fit, law)
@@ -164,14 +171,9 @@ class WholeSearch:
             self.replaced(taken, best, say)
             taken, number = best.law, []
 
-    def richer_of(self, law: Law) -> list[Law]:
-        """Laws that are tried only in place of one with a number that no fit changes."""
-        forms = [w for w in self.laws if w.follows and w.law in law.richer and holds(w, law)]
-        return forms if _fixed(law) else []
-
     def with_harmonic(self, law: Law, fit: Estimate, base: Estimate) -> tuple | None:
         """A law of a fixed number, and its fit with a further wave; None where it has none."""
-        forms = self.richer_of(law)
+        forms = richer_of(law, self.laws)
         if not forms:
             return None
         known = self.own.problem.values(fit.hypothesis, fit.x)[1][fit.hypothesis.laws.index(law)]
@@ -230,10 +232,10 @@ class WholeSearch:
         screened = screen_again(self.own, self.fit, screened)
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
-        candidates = _most_promising(screened) + self.of_many_starts(left)
+        candidates = most_promising(screened) + self.of_many_starts(left)
         trials = self.fitted(self.fit, candidates)
         least = CLOSE_TO_BEST * max((t.gain for t in trials), default=0.0)
-        others = _of_other_effects(screened, candidates)
+        others = of_other_effects(screened, candidates)
         quick = self.fitted(self.fit, others, iterations=QUICK_ITERATIONS)
         near = [t.candidate for t in quick if t.gain > least]
         return sorted(trials + self.fitted(self.fit, near), key=lambda t: -t.gain)
@@ -260,10 +262,15 @@ class WholeSearch:
         return sorted(found, key=lambda t: -t.gain)
 
     def prune(self, say) -> None:
-        """Take out laws without which the rest leaves as little."""
+        """Take out laws without which the last one and the rest leave as little, or hardly more.
+
+        A law that was taken first may have stood for one that came later.
+        """
         for law in tuple(self.taken[:-1]):
             less = without(self.own, self.fit, law)
-            if misfit(self.own, less.hypothesis, less.x) < self.enough:
+            if misfit(self.own, less.hypothesis, less.x) < max(
+                self.enough, HARDLY_MORE * self.left()
+            ):
                 say(f"  whole recordings: {law.key} is needless")
                 self.fit = less
                 self.taken.remove(law)
@@ -312,55 +319,6 @@ class WholeSearch:
     def unseen_share(self, say) -> float:
         """What the fit leaves of rows unseen, over what parameters alone leave there."""
         return unseen_share(self.found, self.own, self.fit, self.plain, say)
-
-
-def _most_promising(screened: Sequence[Candidate]) -> list[Candidate]:
-    """Of each effect and reading the best laws and the one with the fewest values."""
-    forms: dict[tuple, list[Candidate]] = {}
-    for c in sorted((c for c in screened if c.gain > 0.0), key=lambda c: -c.gain):
-        forms.setdefault((c.law.effect, c.law.sensor), []).append(c)
-    found = []
-    for laws in forms.values():
-        plain = min(laws, key=lambda c: count_values(c.law))
-        found += laws[:WHOLE_FORMS] + ([] if plain in laws[:WHOLE_FORMS] else [plain])
-    return found[:WHOLE_TRIED]
-
-
-def _of_other_effects(screened: Sequence[Candidate], tried: Sequence[Candidate]) -> list[Candidate]:
-    """The best candidate of each effect and reading that is not tried.
-
-    A screening about parameters that are far off does not show what these have taken up.
-    """
-    have = {(c.law.effect, c.law.sensor) for c in tried}
-    best: dict[tuple, Candidate] = {}
-    for c in sorted(screened, key=lambda c: -c.gain):
-        best.setdefault((c.law.effect, c.law.sensor), c)
-    return [c for group, c in best.items() if group not in have]
-
-
-def holds(law: Law, plainer: Law) -> bool:
-    """Whether a law has all values of another one of its effect and reading, or more."""
-    names, fewer = ({p.name for p in w.unknowns} for w in (law, plainer))
-    same = (law.effect, law.sensor) == (plainer.effect, plainer.sensor)
-    same = same and law.key != plainer.key
-    return same and fewer <= names and _fixed(plainer).items() <= _fixed(law).items()
-
-
-def _fixed(law: Law) -> dict[str, float]:
-    """Numbers of a law that no fit changes."""
-    return {p.name: p.low for p in law.unknowns if p.low == p.high}
-
-
-def alike(law: Law, laws: Sequence[Law]) -> list[Law]:
-    """Laws that differ from one in a number that no fit changes, the nearest first."""
-    fixed, found = _fixed(law), []
-    for other in laws:
-        numbers = _fixed(other)
-        names = [p.name for p in other.unknowns] == [p.name for p in law.unknowns]
-        same = (other.effect, other.sensor) == (law.effect, law.sensor) and names
-        if fixed and same and numbers != fixed and numbers.keys() == fixed.keys():
-            found.append((sum(abs(numbers[name] - fixed[name]) for name in fixed), other))
-    return [other for _, other in sorted(found, key=lambda f: f[0])]
 
 
 def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:

@@ -141,7 +141,7 @@ def test_a_load_sensor_of_wrong_scale_is_named_where_the_motor_turns_one_body_wi
         r = axis_recording(seed=seed)
         read = 1.3 * r.columns["motor_angle_rad"]
         made.append(replace(r, columns={**r.columns, "load_angle_rad": read}))
-    found = diagnose_windows(axis_case(tmp_path, *made, rig=axis_rig()), quick=True)
+    found = diagnose_windows(axis_case(tmp_path, *made, rig=axis_rig()))
     first = found.document["effects"][0]
     assert first["name"] == "sensor-scale"
     assert first["confidence"] >= 0.5

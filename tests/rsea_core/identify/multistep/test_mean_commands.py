@@ -1,0 +1,49 @@
+"""Long logs are simulated under one mean command in each row where no innovation shows it."""
+
+import numpy as np
+import pytest
+
+import rsea_core.identify.multistep.mean_commands as mean_commands
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.command_timing import CommandTiming
+from rsea_core.identify.multistep.horizons import parameters_with_timing
+from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.mean_commands import with_mean_commands
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """Parameters of an axis whose command moves linearly between 1200 rows."""
+    case = axis_case(
+        tmp_path_factory.mktemp("linear"), axis_recording(seed=1, linear=True), rig=axis_rig()
+    )
+    h, linear = Hypothesis(laws=nuisances(case)), CommandTiming(linear=True)
+    estimator, base, _ = parameters_with_timing(case, h, lambda text: None, timing=linear)
+    return estimator, base
+
+
+def rows_cut(estimator):
+    return [e.finer for e in estimator.problem.benches]
+
+
+def test_a_short_log_keeps_parts_of_rows(fitted):
+    estimator, base = fitted
+    assert rows_cut(with_mean_commands(estimator, base)) == [3]
+
+
+def test_a_long_log_gets_whole_rows_that_predict_alike(fitted, monkeypatch):
+    estimator, base = fitted
+    monkeypatch.setattr(mean_commands, "LONG_ROWS", 1000)
+    monkeypatch.setattr(mean_commands, "LOST_IN_NOISE", 0.6)  # rows are a 50th of a cycle here
+    other = with_mean_commands(estimator, base)
+    assert rows_cut(other) == [1]
+    before, after = (e.innovations([(base.hypothesis, base.x)])[0] for e in (estimator, other))
+    assert 0.0 < np.sqrt(np.mean((before - after) ** 2)) < mean_commands.LOST_IN_NOISE
+
+
+def test_rows_that_show_it_keep_their_parts(fitted, monkeypatch):
+    estimator, base = fitted
+    monkeypatch.setattr(mean_commands, "LONG_ROWS", 1000)
+    monkeypatch.setattr(mean_commands, "LOST_IN_NOISE", 1e-6)
+    assert with_mean_commands(estimator, base) is estimator
