@@ -69,6 +69,7 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
     return [replace(timing, rows=t) for t in rows] + [replace(timing, linear=not timing.linear)]
 
 
+@np.errstate(invalid="ignore", over="ignore")  # runs that leave the range of numbers
 def runs_at(
     runs: NDArray, ahead_s: NDArray, time_s: NDArray, first_rows: Sequence[int],
     winding_time_s: float = 0.0,

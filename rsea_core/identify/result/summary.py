@@ -81,13 +81,16 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
         some = constants_phrase(conclusion.restored_constants)
         return f"Missing physics: {what}; without it {some} share a common factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
-    claimed = {e["name"] for e in conclusion.effects() if e["confidence"] >= CLAIMED}
-    faint = [j for j, law in zip(own, laws, strict=True) if law.effect not in claimed]
+    sure = {e["name"]: e["confidence"] for e in conclusion.effects()}
+    of_each = [sure.get(law.effect, 0.0) for law in laws]
+    faint = [j for j, each in zip(own, of_each, strict=True) if each < CLAIMED]
+    likely = [j for j, each in zip(own, of_each, strict=True) if NEAR <= each < CLAIMED]
     less = ""
     if 0 < len(faint) < len(own):
         what = _listed([_named(conclusion, j) for j in own if j not in faint])
         named = "the laws found explain"
-        less = f" Less sure: {_listed([_named(conclusion, j) for j in faint])}."
+        if likely:
+            less = f" Less sure: {_listed([_named(conclusion, j) for j in likely])}."
     return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave.{less}"
 
 
