@@ -44,7 +44,7 @@ def step_presence(found: Found, number: int, unseen: HeldOut | None) -> float:
         What all laws gain on rows held out; None where there are none.
     """
     if found.complete:  # little but the sensors' noise is left of whole recordings
-        return UNCLAIMED if unseen is not None and unseen.gain <= 0.0 else found.explained
+        return found.explained
     step, ratio = found.steps[number], found.steps[number].ratio
     if number == 0 and unseen is not None:  # evidence of its own: the rows are others
         ratio = float(np.hypot(ratio, max(unseen.ratio, 0.0)))

@@ -71,14 +71,14 @@ class HeldOut:
 def held_out(found: Found) -> HeldOut | None:
     """Gain of the laws over parameters alone on rows held out; None where there are none.
 
-    Complete laws were tested on the last rows of each recording (`whole_runs/unseen.py`); those
-    that acted once, in one recording, are tested by no other.
+    Complete laws were tested on the last rows of each recording and on recordings held out
+    (`whole_runs/unseen.py`).
     """
+    if found.complete:
+        return None
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     own, gain, ratio = found.estimator, 0.0, 0.0
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
-    if found.complete and (not unseen or found.acts_once):
-        return None
     if unseen:
         others = [of_recordings(found, unseen, trial, found.horizon) for trial in trials]
         before, after = (o.innovations([t]) for o, t in zip(others, trials, strict=True))

@@ -17,6 +17,7 @@ from rsea_core.identify.multistep.criteria import (
     LEFT_OF_EACH,
     PER_VALUE,
     SOUND,
+    UNPREDICTED,
     WHOLE_LAWS,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
@@ -182,10 +183,12 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     enough = _enough(found.left_by_parameters)
     if left <= enough:
         found, fit = _without_needless(found, own, fit, enough, say)
-    complete = left <= enough and all(
+    if left > enough or not all(
         needed(own, fit, step.law, without(own, fit, step.law))[0] for step in found.steps
-    )
-    return replace(found, complete=complete)
+    ):
+        return found
+    plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
+    return replace(found, complete=unseen_share(found, own, fit, plain, say) < UNPREDICTED)
 
 
 def _without_needless(

@@ -17,7 +17,12 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import count_values, even_ratio
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.hold_out import of_recordings
-from rsea_core.identify.multistep.criteria import FITTED_ROWS, KEPT_RATIO, UNPREDICTED
+from rsea_core.identify.multistep.criteria import (
+    FITTED_ROWS,
+    HARDLY_MORE,
+    KEPT_RATIO,
+    UNPREDICTED,
+)
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 
@@ -25,8 +30,8 @@ from rsea_core.identify.multistep.kalman_filter import huber_squares
 def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, say) -> float:
     """What a fit leaves of rows that it was not made of, over what parameters alone leave there.
 
-    inf where recordings held out are predicted worse than by parameters alone, unless all that the
-    fit adds is a torque that acted once, in another recording.
+    inf where recordings held out are predicted worse than by parameters alone; hardly worse will do
+    if all that the fit adds is a torque that acted once, in another recording.
 
     Parameters
     ----------
@@ -44,13 +49,12 @@ def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, s
     added = [law for law in fit.hypothesis.laws if law not in plain.hypothesis.laws]
     if share >= UNPREDICTED or not unseen:
         return share
-    if all(law.effect == LoadDisturbance.effect for law in added):
-        return share
+    once = all(law.effect == LoadDisturbance.effect for law in added)
     like = replace(found, estimator=own, horizon=None)
     costs = []
     for trial in ((fit.hypothesis, fit.x), (plain.hypothesis, plain.x)):
         costs.append(_cost(of_recordings(like, unseen, trial, None), *trial))
-    return share if costs[0] < costs[1] else np.inf
+    return share if costs[0] < (HARDLY_MORE if once else 1.0) * costs[1] else np.inf
 
 
 def needed(own: Estimator, fit: Estimate, law: Law, less: Estimate) -> tuple[bool, float]:

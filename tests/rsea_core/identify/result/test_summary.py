@@ -1,0 +1,45 @@
+"""The summary states claimed effects first, likely ones as less sure, and no others."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.result.summary import summary_of
+
+
+def law(effect):
+    return SimpleNamespace(effect=effect, law="of a test", subsystem="load", nuisance=False)
+
+
+def conclusion(*confidences):
+    """A diagnosis of two effects without a sentence of their own."""
+    names = ("effect-a", "effect-b")
+    laws = tuple(law(name) for name in names)
+    effects = [{"name": n, "confidence": c} for n, c in zip(names, confidences, strict=True)]
+    return SimpleNamespace(
+        verdict="missing-physics", question=None, residual=None, unbalance=None, nearest=(),
+        restored_constants=(), fit=SimpleNamespace(hypothesis=Hypothesis(laws=laws), x=None),
+        problem=SimpleNamespace(case=SimpleNamespace(rig=SimpleNamespace(axis="rotary"))),
+        effects=lambda: effects, explained_excess=lambda: 0.9,
+        reported_figures=lambda x, j: {"size": float(j + 1)},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("second", "more"),
+    [
+        (0.7, "effect-b (of a test: size 2); together they explain"),
+        (0.3, "Less sure: effect-b (of a test: size 2)."),
+    ],
+)
+def test_an_effect_is_mentioned_as_surely_as_it_is_known(second, more):
+    text = summary_of(conclusion(0.9, second))
+    assert text.startswith("Missing physics: effect-a (of a test: size 1)")
+    assert more in text
+
+
+def test_an_effect_that_hardly_counts_is_not_mentioned():
+    text = summary_of(conclusion(0.9, 0.02))
+    assert "effect-b" not in text
+    assert "the laws found explain 90 %" in text
