@@ -206,46 +206,46 @@ _side_by_side, _one_by_one = _whitening(LANES), _whitening(1)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def smoothed(A, Q, mode, C, R, start, begins, residual):
-    """Rauch-Tung-Striebel estimates (n, d) of the errors' states and their variances (n, d)."""
+def smoothed(A, Q, mode, C, R, start, residual):
+    """Estimates (n, d) of the errors' states by all rows, and their variances (n, d).
+
+    The modified Bryson-Frazier smoother (Bierman, Factorization Methods for Discrete Sequential
+    Estimation (1977), section X.2) with Joseph's form of the filter's covariance: neither inverts
+    the covariance of a start that is wide beside fine sensors, as Rauch, Tung and Striebel's does.
+    """
     n, p, d = mode.size, C.shape[0], C.shape[1]
-    CT = np.ascontiguousarray(C.T)
-    xp, Pp = np.zeros((n, d)), np.zeros((n, d, d))
-    xf, Pf = np.zeros((n, d)), np.zeros((n, d, d))
+    C, CT, one = np.ascontiguousarray(C), np.ascontiguousarray(C.T), np.eye(d)
     x, P = np.zeros(d), np.diag(start[0])
+    found, Pf, kept = np.zeros((n, d)), np.zeros((n, d, d)), np.zeros((n, d, d))
+    e, weight = np.zeros((n, p)), np.zeros((n, d, p))
     for t in range(n):
-        xp[t], Pp[t] = x, P
         PC = P @ CT
         S = C @ PC
         for i in range(p):
             S[i, i] += R[i]
-        K = PC @ np.linalg.inv(S)
-        x = x + K @ (residual[t] - C @ x)
-        P = P - K @ np.ascontiguousarray(PC.T)
+        inverse = np.linalg.inv(S)
+        K = PC @ inverse
+        e[t], weight[t], kept[t] = residual[t] - C @ x, CT @ inverse, one - K @ C
+        x = x + K @ e[t]
+        P = kept[t] @ P @ np.ascontiguousarray(kept[t].T) + (K * R) @ np.ascontiguousarray(K.T)
         P = 0.5 * (P + P.T)
-        xf[t], Pf[t] = x, P
+        found[t], Pf[t] = x, P
         a = np.ascontiguousarray(A[mode[t]])
         x = a @ x
         P = a @ P @ np.ascontiguousarray(a.T) + Q[mode[t]]
         P = 0.5 * (P + P.T)
-    var = np.zeros((n, d))
-    x, P = xf[n - 1].copy(), Pf[n - 1].copy()
-    xf[n - 1], var[n - 1] = x, np.diag(P)
-    for t in range(n - 2, -1, -1):
-        a = np.ascontiguousarray(A[mode[t]])
-        scale = np.sqrt(np.diag(Pp[t + 1]) + 1e-300)
-        M = Pp[t + 1] / np.outer(scale, scale)
-        for i in range(d):
-            M[i, i] += 1e-12
-        G = np.linalg.solve(M, (a @ Pf[t]) / scale.reshape(-1, 1))
-        G = G / scale.reshape(-1, 1)
-        gain = np.ascontiguousarray(G.T)
-        x = xf[t] + gain @ (x - xp[t + 1])
-        P = Pf[t] + gain @ (P - Pp[t + 1]) @ G
-        P = 0.5 * (P + P.T)
-        xf[t] = x
-        var[t] = np.diag(P)
-    return xf, var
+    variance, later, information = np.zeros((n, d)), np.zeros(d), np.zeros((d, d))
+    for t in range(n - 1, -1, -1):
+        found[t] -= Pf[t] @ later
+        variance[t] = np.diag(Pf[t]) - np.diag(Pf[t] @ information @ Pf[t])
+        if t == 0:
+            break
+        step = np.ascontiguousarray(A[mode[t - 1]])
+        a, seen = kept[t] @ step, C @ step
+        aT, stepT = np.ascontiguousarray(a.T), np.ascontiguousarray(step.T)
+        later = aT @ later - stepT @ (weight[t] @ e[t])
+        information = aT @ information @ a + (stepT @ weight[t]) @ seen
+    return found, variance
 
 
 def huber_squares(e: NDArray) -> NDArray:

@@ -292,7 +292,7 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
         part = slice(first // block, min((last + 1) // block, track.blocks))
         estimate, variance = smoothed(
             errors.A, errors.Q, errors.mode[part], errors.C, track.noise.readings**2,
-            start[None], track.begins[part], left[part],
+            start[None], left[part],
         )  # fmt: skip
         rows = np.arange(first, last + 1)
         at = block * (np.arange(part.start, part.stop) + 0.5) - 0.5

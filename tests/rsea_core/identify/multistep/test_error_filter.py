@@ -73,9 +73,8 @@ def test_the_smoother_errs_by_what_it_says():
         states[t] = x
         rng.standard_normal()
         x = A[0] @ x + root @ rng.standard_normal(2)
-    begins = np.arange(n) == 0
     found, variance = smoothed(
-        A, Q, np.zeros(n, np.int64), C, np.array([noise**2]), np.full((1, 2), 1e-4), begins, read
+        A, Q, np.zeros(n, np.int64), C, np.array([noise**2]), np.full((1, 2), 1e-4), read
     )
     off = (found - states) / np.sqrt(variance)
     assert np.mean(off[20:-20] ** 2) == pytest.approx(1.0, abs=0.25)
