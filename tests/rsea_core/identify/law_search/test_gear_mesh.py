@@ -139,4 +139,5 @@ def test_backlash_before_the_mesh_predicts_what_no_rigid_train_does(cases):
         return np.sqrt(np.mean(estimator.residuals([(hypothesis, x)])[0][0][:, 1] ** 2))
 
     before = error(rigid.estimator, rigid.base.hypothesis, rigid.base.x)
-    assert error(whole.estimator, h, fit.x) < 0.3 * before
+    assert fit.cost < whole.base.cost - 500.0  # units of log-likelihood, beside the elastic mesh
+    assert error(whole.estimator, h, fit.x) < 0.5 * before
