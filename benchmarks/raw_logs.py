@@ -22,7 +22,6 @@ import numpy as np
 
 from benchmarks.servo_cases import arm_cases, leg_cases
 from dftfs.cli.main import main as run_command
-from rsea_core.identify.candidates.catalogue import of_one_body
 from rsea_core.identify.diagnose import diagnose
 from rsea_core.recordings.case import Case, read_case
 
@@ -126,9 +125,7 @@ def compared(own: Case, hand: Case, *, quick: bool) -> str:
         ),
         default=(0.0, "none"),
     )
-    one = of_one_body(hand.rig)  # two names of one law
-    named = [["friction of one body" if e in one else e for e in names] for names in effects]
-    same = verdicts[0] == verdicts[1] and named[0] == named[1]
+    same = verdicts[0] == verdicts[1] and effects[0] == effects[1]
     return (
         f"diagnosis {'equal' if same else 'DIFFERENT'}: {verdicts[0]} {effects[0]}, by hand"
         f" {verdicts[1]} {effects[1]}; largest difference of a value {100 * worst:.2g} % ({of})"

@@ -101,7 +101,7 @@ class Found:
 
     @property
     def acts_once(self) -> bool:
-        """Whether all laws are a torque that acted once: recordings without it cannot test it."""
+        """Whether all laws are external torques that acted once."""
         return all(step.law.effect == LoadDisturbance.effect for step in self.steps)
 
     @property

@@ -65,13 +65,13 @@ class EngineSteps(NamedTuple):
         Steps in the fastest cycle, at least; there is at least one in a row.
     fineness : float
         Factor on the step that this gives, for every recording.
-    in_row : int
-        Parts of a row, in each of which a command that moves linearly is held at its mean.
+    parts_of_row : int
+        Into which a row is cut; a command that moves linearly is held at its mean in each.
     """
 
     per_cycle: float = FIRST_STEPS
     fineness: float = 1.0
-    in_row: int = FINER
+    parts_of_row: int = FINER
 
 
 FIRST = EngineSteps()
@@ -185,7 +185,7 @@ def experiment(
     cycle = _cycle_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
     finer = 1
     if timing.linear and r.load.kind != "imposed" and r.command_name:
-        finer = steps.in_row
+        finer = steps.parts_of_row
         inputs, of_rows = between_rows(inputs, of_rows, finer)
     step = float(np.clip(cycle / steps.per_cycle, LEAST_STEP_s, r.sample_time_s))
     step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
@@ -205,7 +205,7 @@ def experiment(
 
 
 def _columns_of_rows(r: Recording) -> dict[str, NDArray]:
-    """What else acts on the drive from row to row."""
+    """Columns beside the command that act on the drive: its enable signal and its supply."""
     needed = {"drive_enabled": r.command_name, "supply_V": r.command_name == "duty"}
     return {name: r[name] for name, needs in needed.items() if needs and name in r}
 

@@ -209,9 +209,9 @@ _side_by_side, _one_by_one = _whitening(LANES), _whitening(1)
 def smoothed(A, Q, mode, C, R, start, residual):
     """Estimates (n, d) of the errors' states by all rows, and their variances (n, d).
 
-    The modified Bryson-Frazier smoother (Bierman, Factorization Methods for Discrete Sequential
-    Estimation (1977), section X.2) with Joseph's form of the filter's covariance: neither inverts
-    the covariance of a start that is wide beside fine sensors, as Rauch, Tung and Striebel's does.
+    The modified Bryson-Frazier smoother (Bierman, Int. J. Control 18 (1973), 65-75) with the
+    Joseph form of the filter's covariance. Unlike the Rauch-Tung-Striebel smoother it inverts no
+    state covariance, which is ill-conditioned where the start's variance far exceeds a sensor's.
     """
     n, p, d = mode.size, C.shape[0], C.shape[1]
     C, CT, one = np.ascontiguousarray(C), np.ascontiguousarray(C.T), np.eye(d)

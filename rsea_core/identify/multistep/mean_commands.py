@@ -1,7 +1,8 @@
-"""Long logs of a slow machine under one mean command in each row.
+"""One mean command per row in long recordings of a slow machine.
 
-A command that moves linearly from row to row is simulated in parts of rows, which costs as many
-times the steps. Where a cycle of the machine has thousands of rows (EMPS: 5900), their means do.
+A command that moves linearly from row to row is simulated in `FINER` parts of each row, which
+multiplies the steps. Where a cycle of the machine has thousands of rows (EMPS: 5900), the mean
+over each row is accurate enough.
 """
 
 import numpy as np
@@ -12,16 +13,16 @@ from rsea_core.identify.multistep.horizons import in_steps
 
 
 def with_mean_commands(estimator: Estimator, base: Estimate) -> Estimator:
-    """The same with whole rows, where a recording is long and no innovation shows the difference.
+    """The estimator with undivided rows, if a recording is long and innovations hardly change.
 
-    Short ones keep the parts: whole runs that leave nothing but a fine sensor's noise would show
-    it, and they cost little.
+    Short recordings keep the parts of rows: they cost little, and a complete model of a machine
+    with a fine encoder would show the difference in whole recordings.
     """
     problem, trials = estimator.problem, [(base.hypothesis, base.x)]
     long = max(t.experiment.rows for t in estimator.tracks) > LONG_ROWS
     if not (long and problem.timing.linear):
         return estimator
-    other = in_steps(estimator, problem.steps._replace(in_row=1))
+    other = in_steps(estimator, problem.steps._replace(parts_of_row=1))
     for before, after in zip(estimator.innovations(trials), other.innovations(trials), strict=True):
         moved = np.sqrt(np.mean((before - after) ** 2, axis=(0, 1)))
         if not np.all(moved < LOST_IN_NOISE):

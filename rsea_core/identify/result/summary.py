@@ -11,7 +11,7 @@ from rsea_core.identify.judgement.residual import UnexplainedResidual
 from rsea_core.identify.selection.common_scale_factor import constants_phrase
 from rsea_core.identify.selection.criteria import TEMPERATURE
 
-NEAR = 0.1  # belief from which a name that is not the answer is worth a word
+NEAR = 0.1  # confidence from which an effect that is not claimed is mentioned
 CLAIMED = 0.5  # confidence from which an effect stands in the first sentence
 NAMELESS = "Something is missing that no known effect explains"
 
@@ -81,8 +81,8 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
         some = constants_phrase(conclusion.restored_constants)
         return f"Missing physics: {what}; without it {some} share a common factor."
     named = "this explains" if len(laws) == 1 else "together they explain"
-    sure = {e["name"]: e["confidence"] for e in conclusion.effects()}
-    of_each = [sure.get(law.effect, 0.0) for law in laws]
+    confidence = {e["name"]: e["confidence"] for e in conclusion.effects()}
+    of_each = [confidence.get(law.effect, 0.0) for law in laws]
     faint = [j for j, each in zip(own, of_each, strict=True) if each < CLAIMED]
     likely = [j for j, each in zip(own, of_each, strict=True) if NEAR <= each < CLAIMED]
     less = ""

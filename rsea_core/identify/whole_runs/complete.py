@@ -144,9 +144,9 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
 
 
 def _alone(search: WholeSearch) -> list[Trial]:
-    """Single laws beside parameters: the one that made all others needless, those tried first.
+    """Trials of single laws: the one that made all others redundant, then those of the first round.
 
-    A fit that began beside another law may arrive where one from the start did not.
+    A fit that began together with another law can reach a minimum that a direct fit misses.
     """
     if len(search.taken) != 1:
         return search.first
@@ -182,7 +182,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     say(f"whole recordings: what windows showed leaves {left:.2f}")
     enough = _enough(found.left_by_parameters)
     if left <= enough:
-        found, fit = _without_needless(found, own, fit, enough, say)
+        found, fit = _without_redundant(found, own, fit, enough, say)
     if left > enough or not all(
         needed(own, fit, step.law, without(own, fit, step.law))[0] for step in found.steps
     ):
@@ -191,14 +191,14 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     return replace(found, complete=unseen_share(found, own, fit, plain, say) < UNPREDICTED)
 
 
-def _without_needless(
+def _without_redundant(
     found: Found, own: Estimator, fit: Estimate, enough: float, say
 ) -> tuple[Found, Estimate]:
     """The search and its fit of whole recordings, without laws that leave as little if removed."""
     for step in reversed(found.steps):
         less = without(own, fit, step.law)
         if len(found.steps) > 1 and misfit(own, less.hypothesis, less.x) <= enough:
-            say(f"  whole recordings: {step.law.key} is needless")
+            say(f"  whole recordings: {step.law.key} is redundant")
             fit = less
             best = found.estimator.fit(less.hypothesis, less.x, iterations=8)
             steps = [other for other in found.steps if other is not step]

@@ -1,7 +1,7 @@
 """Laws with which whole recordings are predicted to the sensors' noise (docs/diagnosis.md 10.4).
 
 Where parameters alone leave more than that, laws are added one by one, each the one that lowers
-the error most, until nothing is left; then those are taken out that the others make needless. A
+the error most, until nothing is left; then those are taken out that the others make redundant. A
 set of laws that leaves nothing but noise stands, and no windows are searched; one that leaves more
 proves nothing.
 """
@@ -22,10 +22,10 @@ from rsea_core.identify.law_search.screening import Candidate, Projection, scree
 from rsea_core.identify.multistep.criteria import (
     CLOSE_TO_BEST,
     DOUBT,
-    HARDLY_MORE,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     MANY_STARTS,
+    NEGLIGIBLE_INCREASE,
     NEIGHBOURS,
     PER_VALUE,
     PULSES,
@@ -262,16 +262,15 @@ class WholeSearch:
         return sorted(found, key=lambda t: -t.gain)
 
     def prune(self, say) -> None:
-        """Take out laws without which the last one and the rest leave as little, or hardly more.
+        """Remove laws without which the misfit is small enough, or increases by a negligible share.
 
-        A law that was taken first may have stood for one that came later.
+        A law that was taken first may have explained what a later one explains better.
         """
+        most = max(self.enough, NEGLIGIBLE_INCREASE * self.left())
         for law in tuple(self.taken[:-1]):
             less = without(self.own, self.fit, law)
-            if misfit(self.own, less.hypothesis, less.x) < max(
-                self.enough, HARDLY_MORE * self.left()
-            ):
-                say(f"  whole recordings: {law.key} is needless")
+            if misfit(self.own, less.hypothesis, less.x) < most:
+                say(f"  whole recordings: {law.key} is redundant")
                 self.fit = less
                 self.taken.remove(law)
 
@@ -314,11 +313,9 @@ class WholeSearch:
     def complete(self, say) -> bool:
         """Whether the laws leave nothing but noise, and predict rows unseen."""
         enough = bool(self.taken) and self.left() <= self.enough
-        return enough and self.unseen_share(say) < UNPREDICTED
-
-    def unseen_share(self, say) -> float:
-        """What the fit leaves of rows unseen, over what parameters alone leave there."""
-        return unseen_share(self.found, self.own, self.fit, self.plain, say)
+        return enough and (
+            unseen_share(self.found, self.own, self.fit, self.plain, say) < UNPREDICTED
+        )
 
 
 def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:

@@ -19,8 +19,8 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.hold_out import of_recordings
 from rsea_core.identify.multistep.criteria import (
     FITTED_ROWS,
-    HARDLY_MORE,
     KEPT_RATIO,
+    NEGLIGIBLE_INCREASE,
     UNPREDICTED,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -28,10 +28,10 @@ from rsea_core.identify.multistep.kalman_filter import huber_squares
 
 
 def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, say) -> float:
-    """What a fit leaves of rows that it was not made of, over what parameters alone leave there.
+    """Cost beyond noise of rows that a fit was not made of, over that of parameters alone.
 
-    inf where recordings held out are predicted worse than by parameters alone; hardly worse will do
-    if all that the fit adds is a torque that acted once, in another recording.
+    inf if recordings held out cost more than with parameters alone. If the fit adds only a torque
+    that acted once, in another recording, they may cost up to `NEGLIGIBLE_INCREASE` times as much.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, s
     costs = []
     for trial in ((fit.hypothesis, fit.x), (plain.hypothesis, plain.x)):
         costs.append(_cost(of_recordings(like, unseen, trial, None), *trial))
-    return share if costs[0] < (HARDLY_MORE if once else 1.0) * costs[1] else np.inf
+    return share if costs[0] < (NEGLIGIBLE_INCREASE if once else 1.0) * costs[1] else np.inf
 
 
 def needed(own: Estimator, fit: Estimate, law: Law, less: Estimate) -> tuple[bool, float]:

@@ -140,4 +140,5 @@ def test_backlash_before_the_mesh_predicts_what_no_rigid_train_does(cases):
 
     before = error(rigid.estimator, rigid.base.hypothesis, rigid.base.x)
     assert fit.cost < whole.base.cost - 500.0  # units of log-likelihood, beside the elastic mesh
-    assert error(whole.estimator, h, fit.x) < 0.5 * before
+    # a rigid train errs by that wherever the load stands in its play (uniform distribution)
+    assert error(whole.estimator, h, fit.x) < WIDTH / math.sqrt(12.0) < before

@@ -28,7 +28,7 @@ def test_a_pulse_is_named_with_its_time_and_size(tmp_path):
     assert found["peak_Nm"] == pytest.approx(PULSE.peak_Nm, rel=0.15)
 
 
-def test_a_pulse_needs_no_proof_by_a_recording_in_which_nothing_acted(tmp_path):
+def test_a_pulse_is_named_with_a_recording_held_out_in_which_nothing_acted(tmp_path):
     unseen = axis_recording(seed=6, role="validation")
     pushed = axis_recording(PULSE, seed=5)
     found = diagnose_windows(axis_case(tmp_path, pushed, unseen, rig=axis_rig()))

@@ -1,4 +1,4 @@
-"""Long logs are simulated under one mean command in each row where no innovation shows it."""
+"""Long recordings have one mean command per row where the innovations hardly change by it."""
 
 import numpy as np
 import pytest
@@ -27,12 +27,12 @@ def rows_cut(estimator):
     return [e.finer for e in estimator.problem.benches]
 
 
-def test_a_short_log_keeps_parts_of_rows(fitted):
+def test_a_short_recording_keeps_parts_of_rows(fitted):
     estimator, base = fitted
     assert rows_cut(with_mean_commands(estimator, base)) == [3]
 
 
-def test_a_long_log_gets_whole_rows_that_predict_alike(fitted, monkeypatch):
+def test_a_long_recording_has_undivided_rows_that_predict_alike(fitted, monkeypatch):
     estimator, base = fitted
     monkeypatch.setattr(mean_commands, "LONG_ROWS", 1000)
     monkeypatch.setattr(mean_commands, "LOST_IN_NOISE", 0.6)  # rows are a 50th of a cycle here
@@ -42,7 +42,7 @@ def test_a_long_log_gets_whole_rows_that_predict_alike(fitted, monkeypatch):
     assert 0.0 < np.sqrt(np.mean((before - after) ** 2)) < mean_commands.LOST_IN_NOISE
 
 
-def test_rows_that_show_it_keep_their_parts(fitted, monkeypatch):
+def test_rows_whose_innovations_change_keep_their_parts(fitted, monkeypatch):
     estimator, base = fitted
     monkeypatch.setattr(mean_commands, "LONG_ROWS", 1000)
     monkeypatch.setattr(mean_commands, "LOST_IN_NOISE", 1e-6)

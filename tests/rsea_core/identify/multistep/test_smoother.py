@@ -57,7 +57,7 @@ def test_wide_starts_keep_their_deviations(torque_Nm):
         A[None], (step @ step.T)[None], mode, C, READINGS, start[None], readings
     )
     found, spread = batch(A, step, C, start, readings)
-    # of the first row 1e2 less 1e2 - 4e-9 are left in double precision
+    # a first speed's variance is 1e2 less a number that differs from it by 4e-9
     assert np.sqrt(variance[0]) == pytest.approx(spread[0], rel=0.1)
     assert np.sqrt(variance[1:]) == pytest.approx(spread[1:], rel=1e-6)
     assert np.max(np.abs(estimate - found) / spread) < 2e-3

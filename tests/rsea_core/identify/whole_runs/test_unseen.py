@@ -1,35 +1,27 @@
 """Laws of the machine predict rows that they were not fitted to; laws that follow a path do not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.spring_parallel import SpringParallel
-from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import fitted
-from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Projection, screen
 from rsea_core.identify.law_search.search import laws_of
-from rsea_core.identify.multistep.horizons import parameters_with_timing
-from rsea_core.identify.multistep.log_nuisances import nuisances
-from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
-from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+from tests.cases.one_axis import axis_recording
+from tests.cases.whole_runs import searched_axis
+
+SPRING = SpringParallel(stiffness_Nm_per_rad=0.01)
 
 
 @pytest.fixture(scope="module")
 def sprung(tmp_path_factory):
     """A search of an axis with a hidden spring, and parameters alone in the sensors' noise."""
-    spring = SpringParallel(stiffness_Nm_per_rad=0.01)
-    case = axis_case(
-        tmp_path_factory.mktemp("sprung"), axis_recording(spring, seed=1), rig=axis_rig()
-    )
-    h = Hypothesis(laws=nuisances(case))
-    estimator, base, horizon = parameters_with_timing(case, h, lambda text: None)
-    found = Found(problem=estimator.problem, base_estimator=estimator, base=base,
-                  estimator=estimator, best=base, horizon=horizon)  # fmt: skip
-    own = in_sensor_noise(estimator)
-    return found, own, own.fit(base.hypothesis, base.x, iterations=12)
+    return searched_axis(tmp_path_factory.mktemp("sprung"), axis_recording(SPRING, seed=1))
 
 
 @pytest.fixture(scope="module")
@@ -42,7 +34,7 @@ def true_law(sprung):
 @pytest.fixture(scope="module")
 def pulse(sprung):
     _, own, plain = sprung
-    return fitted(own, plain, pulses(Projection(own, plain))[0])
+    return best_pulse(own, plain)
 
 
 def test_a_law_of_the_machine_predicts_unseen_rows_evenly(sprung, true_law):
@@ -57,6 +49,24 @@ def test_a_torque_that_acts_once_does_not_predict_what_a_spring_does(sprung, pul
     found, own, plain = sprung
     assert pulse.cost < plain.cost - 100.0  # as a fit, it is worth much
     assert unseen_share(found, own, pulse, plain, lambda text: None) > 0.3
+
+
+def best_pulse(own, plain):
+    return fitted(own, plain, pulses(Projection(own, plain))[0])
+
+
+@pytest.mark.parametrize(("tolerances", "refuted"), [(0.0, False), (0.5, True)])
+def test_a_recording_held_out_refutes_a_pulse_whose_values_predict_it_worse(
+    tmp_path, tolerances, refuted
+):
+    disturbance = LoadDisturbance(start_s=5.0, end_s=6.2, peak_Nm=0.08)
+    found, own, plain = searched_axis(
+        tmp_path, axis_recording(disturbance, seed=5), axis_recording(seed=6, role="validation")
+    )
+    fit = best_pulse(own, plain)
+    off = np.eye(fit.x.size)[[p.key for p in own.problem.nominals].index("load_inertia_kgm2")]
+    fit = replace(fit, x=fit.x + tolerances * off)
+    assert np.isinf(unseen_share(found, own, fit, plain, lambda text: None)) == refuted
 
 
 def test_a_fit_without_a_law_is_that_of_the_others(sprung, true_law):
