@@ -31,7 +31,8 @@ from dftfs.fem.mesh import TaggedMesh, extruded, replicated
 from dftfs.spring.edges import Edge, OffsetEdge
 from dftfs.spring.outline import SpringOutline
 
-_FRONTAL_QUADS, _BLOSSOM = 8, 1
+_FRONTAL_QUADS, _FRONTAL, _MESH_ADAPT, _BLOSSOM = 8, 6, 1, 1
+_OVERLAP = 1e-9  # of a block's area: rounding of sums of areas
 _MIN_PIECES = {"notch_fillet": 4, "foot_fillet": 2, "slit_fillet": 4, "tip_fillet": 2}
 
 
@@ -179,13 +180,35 @@ def _mirror_cuts(pieces: list[tuple[Edge, float, float]]) -> None:
 def _gmsh_faces(
     rings: list[NDArray], sizes: list[NDArray]
 ) -> tuple[NDArray, tuple[tuple[int, ...], ...]]:
-    """Mesh inside the first polygon less the others; sides stay whole, corners come first."""
+    """Mesh between polygons, holes turned the other way; sides stay whole, corners come first.
+
+    Frontal-Delaunay for quads returns a folded mesh now and then (elements that lie over others,
+    stiffness 0.1 % low, with no word from gmsh): the areas show it, and another algorithm is taken.
+    """
+    wanted = abs(sum(_area(ring) for ring in rings))
+    for algorithm in (_FRONTAL_QUADS, _FRONTAL, _MESH_ADAPT):
+        nodes, faces = _generated(rings, sizes, algorithm)
+        if abs(sum(_area(nodes[list(face)]) for face in faces) - wanted) <= _OVERLAP * wanted:
+            return nodes, faces
+    raise MeshError(f"gmsh's elements overlap in a block of {len(rings[0])} sides")
+
+
+def _area(polygon: NDArray) -> float:
+    """Area inside a polygon (n, 2), positive where it turns anticlockwise."""
+    x, y = polygon.T
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2
+
+
+def _generated(
+    rings: list[NDArray], sizes: list[NDArray], algorithm: int
+) -> tuple[NDArray, tuple[tuple[int, ...], ...]]:
+    """One mesh by one algorithm of gmsh."""
     scale = float(np.ptp(rings[0]))
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Verbosity", 0)
         gmsh.option.setNumber("General.NumThreads", 1)
-        gmsh.option.setNumber("Mesh.Algorithm", _FRONTAL_QUADS)
+        gmsh.option.setNumber("Mesh.Algorithm", algorithm)
         gmsh.option.setNumber("Mesh.RecombineAll", 1)
         gmsh.option.setNumber("Mesh.RecombinationAlgorithm", _BLOSSOM)
         gmsh.option.setNumber("Mesh.Smoothing", 10)
@@ -234,6 +257,4 @@ def _read_faces(
 
 
 def _anticlockwise(nodes: NDArray, face: tuple[int, ...]) -> tuple[int, ...]:
-    x, y = nodes[list(face)].T
-    area = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))
-    return face if area > 0 else face[::-1]
+    return face if _area(nodes[list(face)]) > 0 else face[::-1]

@@ -13,7 +13,33 @@ from dftfs.fem.mesh import jacobian_determinants
 from dftfs.spring.outline import build_outline
 from tests.cases.spring import FIT, ONE_ARM, REF, THREE_ARMS
 
-CASES = {"fit": FIT, "ref": REF, "three arms": THREE_ARMS, "one arm": ONE_ARM}
+# gmsh's Frontal-Delaunay for quads folds the hub's block of one and the rim's block of the other
+FOLDED_HUB = replace(
+    FIT,
+    outer_radius_m=0.0676784590197185,
+    turns=1.3058879612972296,
+    thickness_m=0.008712205981352085,
+    fillet_radius_m=0.0016579267530974007,
+    rim_inner_radius_m=0.07203456201039456,
+    rim_outer_radius_m=0.08074676799174663,
+)
+FOLDED_RIM = replace(
+    FIT,
+    outer_radius_m=0.0824729872631318,
+    turns=2.194511961729785,
+    thickness_m=0.006527054725512611,
+    fillet_radius_m=0.0006212763302084711,
+    rim_inner_radius_m=0.0857365146258881,
+    rim_outer_radius_m=0.09226356935140072,
+)
+CASES = {
+    "fit": FIT,
+    "ref": REF,
+    "three arms": THREE_ARMS,
+    "one arm": ONE_ARM,
+    "folded hub": FOLDED_HUB,
+    "folded rim": FOLDED_RIM,
+}
 GAUSS_3X3 = np.outer([5, 8, 5], [5, 8, 5]).ravel() / 18**2  # on the unit square
 
 
