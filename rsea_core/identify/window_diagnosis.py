@@ -230,10 +230,9 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
                 f" value ({p.value:.4g} -> {conclusion.nominal[p.key]:.4g}): is the file right?"
             )
             found.append(Finding(kind=Kind.METHOD, text=text))
-    for file in conclusion.found.shared:
+    for file, why in conclusion.found.shared.items():
         text = (
-            f"{file}: its first two thirds were fitted, for no other recording lets the load move;"
-            " the last third stayed held out"
+            f"{file}: its first two thirds were fitted, for {why}; the last third stayed held out"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
     if conclusion.unknown_torque is not None:

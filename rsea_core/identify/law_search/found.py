@@ -65,8 +65,8 @@ class Found:
         One for each law.
     refused : Step or None
         A law taken and taken out again, for it gained in too few stretches of rows.
-    shared : tuple of str
-        Recordings held out of which a part was fitted (`hold_out.with_moving_loads`).
+    shared : dict of str
+        Recordings held out of which a part was fitted, and why (`hold_out.with_all_loads`).
     left_by_parameters : float
         What parameters alone leave of whole recordings, in deviations of the sensors' noise
         (`whole_runs`); inf: not known.
@@ -84,7 +84,7 @@ class Found:
     best: Estimate
     horizon: float | None
     base_horizon: float | None = None
-    shared: tuple[str, ...] = ()
+    shared: dict[str, str] = field(default_factory=dict)
     steps: list[Step] = field(default_factory=list)
     refused: Step | None = None
     base_shapes: list[Shape] = field(default_factory=list)

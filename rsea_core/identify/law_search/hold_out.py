@@ -3,8 +3,8 @@
 Recordings that the case holds out serve as they are. A case without any, or with such that the
 laws do not concern, lends the last quarter of
 each recording: both hypotheses are fitted to the rows before it once more. Where only recordings
-held out let the load move, the others say nothing of it: two thirds of these are fitted then, and
-the last third stays held out.
+held out let the load move, or meet a contact, the others say nothing of it: two thirds of these are
+fitted then, and the last third stays held out.
 """
 
 from dataclasses import dataclass, replace
@@ -36,20 +36,30 @@ def part_of(r: Recording, first: int, last: int, **changes) -> Recording:
     return replace(r, columns=columns, logged=logged, **begun, **changes)
 
 
-def with_moving_loads(case: Case) -> tuple[Case, tuple[str, ...]]:
-    """The case with what alone lets its load move among the fitted, and the files shared."""
-    if any(r.load.kind not in HELD for r in case.identification):
-        return case, ()
-    recordings, files = [], []
+def with_all_loads(case: Case) -> tuple[Case, dict[str, str]]:
+    """The case with loads that only recordings held out have among the fitted, and why, by file."""
+    kinds = {r.load.kind for r in case.identification}
+    recordings, shared = [], {}
     for r in case.recordings:
+        why = None
+        if r.role == "validation" and not r.quasi_static:
+            why = _only_there(r.load.kind, kinds)
         cut = int(SHARED * r.rows)
-        free = r.role == "validation" and r.load.kind not in HELD and not r.quasi_static
-        if free and cut >= LEAST_ROWS and r.rows - cut >= LEAST_ROWS:
+        if why is not None and cut >= LEAST_ROWS and r.rows - cut >= LEAST_ROWS:
             recordings += [part_of(r, 0, cut, role="identification"), part_of(r, cut, r.rows)]
-            files.append(r.file)
+            shared[r.file] = why
         else:
             recordings.append(r)
-    return replace(case, recordings=tuple(recordings)), tuple(files)
+    return replace(case, recordings=tuple(recordings)), shared
+
+
+def _only_there(kind: str, fitted: set[str]) -> str | None:
+    """What a recording with such a load shows that none with the fitted loads does."""
+    if kind not in HELD and fitted <= set(HELD):
+        return "no other recording lets the load move"
+    if kind == "contact" and kind not in fitted:
+        return "no other recording meets a contact"
+    return None
 
 
 @dataclass(frozen=True, kw_only=True)
