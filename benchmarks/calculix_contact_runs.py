@@ -13,7 +13,7 @@ from dftfs.analysis.torsion.ring_fields import bare_model
 from dftfs.design import load_design
 from dftfs.fem.constraints import clamped, rigid_rotation
 from dftfs.fem.contact import ContactLaw, ContactSurfaces
-from dftfs.fem.deck import Model, deck, element_faces
+from dftfs.fem.deck import TIGHT_RESIDUAL, Model, deck, element_faces
 from dftfs.fem.mesh import TaggedMesh
 from dftfs.fem.newton import solve_path
 from dftfs.fem.problem import StaticProblem
@@ -26,6 +26,8 @@ HALVES = 2  # half the width is solved on, by both: the mid-plane is a mirror
 SLAVE_REACH_M, MASTER_REACH_M = 8e-3, 16e-3
 CONTACT_FROM_RAD = 0.18  # before, no coil is near another: CalculiX is spared the search
 DEFLECTIONS_RAD = tuple(np.round(0.03 * np.arange(1, 11), 3).tolist())
+
+LIMIT = f"*CONTROLS, PARAMETERS=FIELD\n{TIGHT_RESIDUAL}\n"  # of `deck`
 
 
 def torsion_problem() -> TorsionProblem:
@@ -83,6 +85,7 @@ def paired_deck(
     *,
     stiffness: float,
     from_rad: float,
+    tight: bool = False,
 ) -> str:
     """`calculix_deck.deck` with a mirror plane, pairs of surfaces, increments of CalculiX' choice.
 
@@ -94,6 +97,8 @@ def paired_deck(
         Facets that may touch, added in the first step beyond ``from_rad``.
     stiffness : float
         Of the linear pressure-overclosure, Pa/m.
+    tight : bool
+        Lower limit of the residual in steps without contact: the default leaves 1 % of the torque.
     """
     lines = [
         "*NSET, NSET=MIRROR",
@@ -109,13 +114,14 @@ def paired_deck(
         lines += [f"*SURFACE, NAME=FLOOR{arm}", *element_faces(model.cells, master)]
         lines += ["*CONTACT PAIR, INTERACTION=TOUCH, TYPE=SURFACE TO SURFACE"]
         lines += [f"CEILING{arm}, FLOOR{arm}"]
-    head, *steps = deck(model, deflections_rad, tight=False).split("*STEP, NLGEOM")
+    head, *steps = deck(model, deflections_rad, tight=tight).split("*STEP, NLGEOM")
     names = [f"CEILING{arm}, FLOOR{arm}" for arm in range(len(pairs))]
     for k, deflection in enumerate(deflections_rad):
         if k == 0:
             steps[k] = _change(steps[k], "REMOVE", names)
         if abs(deflection) > from_rad:
             steps[k] = steps[k].replace("*STATIC, DIRECT\n1., 1.", "*STATIC\n0.1, 1.")
+            steps[k] = steps[k].replace(LIMIT, "*CONTROLS, RESET\n")
             if abs(deflections_rad[k - 1]) <= from_rad:
                 steps[k] = _change(steps[k], "ADD", names)
     steps = [f"*STEP, NLGEOM, INC=1000{step}" for step in steps]

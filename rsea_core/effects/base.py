@@ -175,6 +175,8 @@ class Term(ABC):
     port : Port
     replaces : str or None
         The rig value whose nominal law it stands in for; None when it adds to the nominal law.
+    generalises : str or None
+        The effect that this one is where its further values are zero: no rival of it.
     in_spring_table : bool
         Whether it is nothing but a change of the spring's elastic law (`on_spring`).
     headline : str
@@ -193,6 +195,7 @@ class Term(ABC):
     port: ClassVar[Port]
     law: ClassVar[str]
     replaces: ClassVar[str | None] = None
+    generalises: ClassVar[str | None] = None
     in_spring_table: ClassVar[bool] = False
     headline: ClassVar[str] = ""
     figure_units: ClassVar[Mapping[str, str]] = {}

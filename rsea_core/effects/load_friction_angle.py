@@ -57,6 +57,7 @@ class LoadFrictionAngle(Term):
 
     effect: ClassVar[str] = "load-friction-angle"
     law: ClassVar[str] = "once-a-turn"
+    generalises: ClassVar[str] = LoadFriction.effect
     port: ClassVar[Port] = Port.LOAD
     headline: ClassVar[str] = "Dry friction in the load's joint depends on the load's angle."
     figure_units: ClassVar[Mapping[str, str]] = {"coulomb_Nm": "Nm", "share": "-"}

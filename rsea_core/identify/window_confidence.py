@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from rsea_core.identify.candidates.catalogue import of_one_body
+from rsea_core.identify.candidates.catalogue import of_one_body, rivals_of
 from rsea_core.identify.law_search.candidate_fits import far_from_rig
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.hold_out import HeldOut
@@ -76,8 +76,9 @@ def _among_rivals(step: Step, rig: Rig) -> float:
     """Probability of the step's effect, if it or a rival is there."""
     scale = RIVAL_SCALE + RIVAL_SHARE * step.gain if step.doubt is None else step.doubt
     own = step.law.effect  # in another reading it is the same effect elsewhere
+    others = rivals_of(step.law, step.rivals)
     odds = [
-        np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in step.rivals
+        np.exp(min((gain - step.gain) / scale, 0.0)) for law, gain in others
         if law.effect != own and gain > 0.0
         and not {law.effect, step.law.effect} <= of_one_body(rig)
     ]  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.load_unbalance import LoadUnbalance
-from rsea_core.identify.candidates.catalogue import of_one_body
+from rsea_core.identify.candidates.catalogue import of_one_body, rivals_of
 from rsea_core.identify.candidates.rig_parameters import place_of
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
@@ -180,7 +180,8 @@ class WindowVerdict(Conclusion):
             if self.verdict == "unexplained":
                 confidence = min(confidence, UNCLAIMED)
             scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
-            alike = [law.effect for law, gain in step.rivals if step.gain - gain < scale]
+            others = rivals_of(step.law, step.rivals)
+            alike = [law.effect for law, gain in others if step.gain - gain < scale]
             found.append(
                 {
                     "name": step.law.effect,
@@ -240,7 +241,8 @@ class WindowVerdict(Conclusion):
         if len(self.found.steps) != 1 or self.refuted:
             return []
         step = self.found.steps[0]
-        gains, one = {law.key: gain for law, gain in step.rivals}, of_one_body(self.case.rig)
+        gains = {law.key: gain for law, gain in rivals_of(step.law, step.rivals)}
+        one = of_one_body(self.case.rig)
         others = [
             (fit, step.gain - gains[c.law.key]) for c, _, fit in step.near
             if c.law.effect != step.law.effect and c.law.key in gains

@@ -1,5 +1,7 @@
 """Every variant that a diagnosis tries on a case, its starts scaled by the machine."""
 
+from collections.abc import Iterable
+
 from rsea_core.effects.base import Port, Term
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.load_friction import LoadFriction
@@ -47,6 +49,11 @@ def _on_the_load(law: Law, rig: Rig) -> bool:
 def of_one_body(rig: Rig) -> set[str]:
     """Effects that are one law where nothing bends between gear and load."""
     return set() if rig.has("spring") else {GEAR, LoadFriction.effect}
+
+
+def rivals_of(law: Law, others: Iterable[tuple[Law, float]]) -> list[tuple[Law, float]]:
+    """Of laws and their gains those that are another explanation: none that contains the law."""
+    return [(w, gain) for w, gain in others if w.kind is None or w.kind.generalises != law.effect]
 
 
 def _kinds() -> list[type[Term]]:

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.spring_hardening import SpringHardening
 from rsea_core.identify import window_confidence
@@ -15,7 +17,7 @@ from rsea_core.machine.rig import Rig
 
 
 def law(kind, sensor=None):
-    return SimpleNamespace(effect=kind.effect, sensor=sensor)
+    return SimpleNamespace(effect=kind.effect, sensor=sensor, kind=kind)
 
 
 def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0, doubt=None, complete=False,
@@ -58,6 +60,12 @@ def test_a_law_that_is_nearly_all_is_as_probable_as_the_share_that_it_explains()
 def test_the_same_effect_in_another_reading_is_no_rival():
     motor, load = law(SensorScale, "motor_angle_rad"), law(SensorScale, "load_angle_rad")
     assert step_confidence(found(load, (motor, 200.0)), 0, None) == pytest.approx(0.97)
+
+
+def test_a_law_that_contains_the_one_found_is_no_rival_but_the_plain_one_is():
+    plain, angle = law(LoadFriction), law(LoadFrictionAngle)
+    assert step_confidence(found(plain, (angle, 200.0)), 0, None) == pytest.approx(0.97)
+    assert step_confidence(found(angle, (plain, 200.0)), 0, None) == pytest.approx(0.5, abs=0.01)
 
 
 def test_dependent_innovations_lower_the_ratio_and_only_where_parameters_predicted(monkeypatch):
