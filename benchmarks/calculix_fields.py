@@ -5,10 +5,12 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from dftfs.fem.mesh import TaggedMesh
+from dftfs.spring.clearance import sample_coil_gap
+from dftfs.spring.outline import SpringOutline
 
 _POINTS = 17  # on each quadratic edge of a facet
 _FAR_M = 1e3  # where nothing is near
-_END_ZONE = 4.0  # fillet radii beside a gap's closed ends that count as the fillet
+_SPACING_M = 5e-5  # of the outline's points
 
 
 def frd_fields(frd: str, name: str, columns: int) -> list[NDArray[np.float64]]:
@@ -27,20 +29,21 @@ def frd_fields(frd: str, name: str, columns: int) -> list[NDArray[np.float64]]:
 
 
 def smallest_gap_m(
-    mesh: TaggedMesh, displacement_m: NDArray[np.float64], fillet_radius_m: float
+    mesh: TaggedMesh, displacement_m: NDArray[np.float64], outline: SpringOutline
 ) -> float:
     """Smallest distance between floor and ceiling of gap 0 in the deformed mid-plane.
 
-    Near its closed ends the gap is the fillet, and not counted. Distances of points of the ceiling
-    from the chords between points of the floor; both edges are sampled by their shape functions.
+    Near its closed ends the gap is the fillet, and not counted, as in `dftfs.spring.clearance`.
+    Distances of points of the ceiling from the chords between points of the floor; both edges are
+    sampled by their shape functions.
     """
-    ends = cKDTree(mesh.nodes[mesh.boundary_nodes("gap_ends"), :2])
+    counted = sample_coil_gap(outline, _SPACING_M)
     moved = mesh.nodes + displacement_m
     sides = []
-    for name in ("gap_floor", "gap_ceiling"):
+    for name, places in (("gap_floor", counted.floor_m), ("gap_ceiling", counted.ceiling_m)):
         edges = _lower_edges(mesh, mesh.facets(name))
         rest = _sampled(mesh.nodes[edges][..., :2])
-        fillet = ends.query(rest)[0] < _END_ZONE * fillet_radius_m
+        fillet = cKDTree(places).query(rest)[0] > _SPACING_M
         sides.append((_sampled(moved[edges][..., :2]), fillet))
     (floor, at_end), (ceiling, left_out) = sides
     floor[at_end] += _FAR_M

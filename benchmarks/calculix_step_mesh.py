@@ -37,8 +37,8 @@ def step_ring(path: Path, design: SpringDesign, sizing: StepMeshSizing) -> Tagge
     """Hex20 mesh of the whole ring, half the width, from a STEP file in mm.
 
     Boundaries: ``bore``, ``rim_outer``; the fillets ``notch`` and ``slit`` of all arms; ``floor``
-    and ``ceiling`` of all gaps between the coils; ``gap_floor``, ``gap_ceiling`` and the closed
-    ends ``gap_ends`` of gap 0. ``bottom`` is the face that gmsh meshed: here the mid-plane.
+    and ``ceiling`` of all gaps between the coils; ``gap_floor`` and ``gap_ceiling`` of gap 0.
+    ``bottom`` is the face that gmsh meshed: here the mid-plane.
     """
     gmsh.initialize(interruptible=False)
     try:
@@ -158,5 +158,4 @@ def named_facets(
         "ceiling": facets[ceiling],
         "gap_floor": facets[floor & first],
         "gap_ceiling": facets[ceiling & first],
-        "gap_ends": facets[first & np.isin(kind, ("notch_fillet", "slit_fillet"))],
     }

@@ -170,7 +170,7 @@ def theirs(
         "cpu_s": cpu_s,
         "torque_Nm": HALVES * torques_Nm(dat, model, len(deflections_rad) if finished else reached),
         "gap_m": [
-            smallest_gap_m(ring, moved, spiral.fillet_radius_m)
+            smallest_gap_m(ring, moved, design.outline)
             for moved in frd_fields(frd, "DISP", 3)[: len(FREE)]
         ],
         "stress_Pa": regional_peaks_Pa(

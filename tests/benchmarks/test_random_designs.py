@@ -65,14 +65,14 @@ def test_the_gap_of_the_undeformed_and_of_a_squeezed_ring_is_the_outlines(ring):
     design = load_design("al1")
     exact = sample_coil_gap(design.outline, 5e-5)
     nearest = measure_clearance(exact.floor_m, exact.ceiling_m, deepest_m=3e-3).smallest_m
-    radius = design.spiral.fillet_radius_m
-    rest = smallest_gap_m(ring, np.zeros_like(ring.nodes), radius)
-    assert rest == pytest.approx(nearest, rel=5e-3)  # the fillet's zone by distance, not along
-    squeezed = smallest_gap_m(ring, -0.25 * ring.nodes, radius)
+    outline = design.outline
+    rest = smallest_gap_m(ring, np.zeros_like(ring.nodes), outline)
+    assert rest == pytest.approx(nearest, rel=5e-3)  # the zone ends within the points' spacing
+    squeezed = smallest_gap_m(ring, -0.25 * ring.nodes, outline)
     assert squeezed == pytest.approx(0.75 * rest, rel=1e-6)
     turned = np.zeros_like(ring.nodes)
     turned[:, :2] = rotate(ring.nodes[:, :2], 0.7) - ring.nodes[:, :2]
-    assert smallest_gap_m(ring, turned, radius) == pytest.approx(rest, rel=1e-6)
+    assert smallest_gap_m(ring, turned, outline) == pytest.approx(rest, rel=1e-6)
 
 
 @pytest.mark.needs_cad
