@@ -71,24 +71,44 @@ def _nearest(points, normals, polyline, other, deepest):
     n, m = len(points), len(polyline) - 1
     gap, foot, segment = np.full(n, np.inf), np.full((n, 2), np.nan), np.full(n, -1)
     for i in range(n):
-        best = np.inf
+        nearest, ahead, behind = np.inf, np.inf, np.inf  # of all segments, of those that face
+        at_ahead, at_behind = -1, -1
         for k in range(m):
-            if normals[i, 0] * other[k, 0] + normals[i, 1] * other[k, 1] >= _FACING:
-                continue
-            dx, dy = polyline[k + 1, 0] - polyline[k, 0], polyline[k + 1, 1] - polyline[k, 1]
-            px, py = points[i, 0] - polyline[k, 0], points[i, 1] - polyline[k, 1]
-            along = (px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300)
-            if (k == 0 and along <= 0) or (k == m - 1 and along >= 1):
+            facing = normals[i, 0] * other[k, 0] + normals[i, 1] * other[k, 1] < _FACING
+            inside, tx, ty = _foot(points[i], polyline, k)
+            if not inside:
                 continue  # beyond the polyline's ends nothing is known
-            along = min(max(along, 0.0), 1.0)
-            tx, ty = along * dx - px, along * dy - py
             distance = np.hypot(tx, ty)
+            nearest = min(nearest, distance)
+            if not facing:
+                continue
+            if tx * normals[i, 0] + ty * normals[i, 1] >= 0:
+                if distance < ahead:
+                    ahead, at_ahead = distance, k
+            elif distance < min(behind, deepest):
+                behind, at_behind = distance, k
+        # edges that overlap are nowhere nearer to each other than where they face each other
+        if behind > nearest:
+            behind = np.inf
+        k = at_ahead if ahead <= behind else at_behind
+        distance = min(ahead, behind)
+        if distance < np.inf:
+            _, tx, ty = _foot(points[i], polyline, k)
             outwards = tx * normals[i, 0] + ty * normals[i, 1]
-            if distance < best and not (outwards < 0 and distance >= deepest):
-                best = distance
-                # a nearest foot off to the side is a corner: its own projection measures it
-                aside = abs(outwards) < _CONE * distance
-                gap[i] = np.inf if aside else np.copysign(distance, outwards)
-                foot[i, 0], foot[i, 1] = points[i, 0] + tx, points[i, 1] + ty
-                segment[i] = k
+            # a nearest foot off to the side is a corner: its own projection measures it
+            aside = abs(outwards) < _CONE * distance
+            gap[i] = np.inf if aside else np.copysign(distance, outwards)
+            foot[i, 0], foot[i, 1] = points[i, 0] + tx, points[i, 1] + ty
+            segment[i] = k
     return gap, foot, segment
+
+
+@njit(cache=True, inline="always")
+def _foot(point, polyline, k):
+    """Whether a point projects on the polyline at segment k, and the step (2,) to its foot."""
+    dx, dy = polyline[k + 1, 0] - polyline[k, 0], polyline[k + 1, 1] - polyline[k, 1]
+    px, py = point[0] - polyline[k, 0], point[1] - polyline[k, 1]
+    along = (px * dx + py * dy) / max(dx * dx + dy * dy, 1e-300)
+    beyond = (k == 0 and along <= 0) or (k == len(polyline) - 2 and along >= 1)
+    along = min(max(along, 0.0), 1.0)
+    return not beyond, along * dx - px, along * dy - py
