@@ -83,14 +83,18 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
     if rig.has("gear"):
         inertia, damping = ONE_BODY
         keys += [_less_certain(rig, inertia), _less_certain(rig, damping)]
-        one_body = not rig.has("spring") and rig.load_viscous_Nms_per_rad is not None
-        if keys[-1] is None and not one_body:  # absent is unknown, not none
+        if keys[-1] is None:  # absent is unknown, not none
             keys.append(damping[0])
         keys += _damping_left_out(rig, keys)
     if rig.has("spring"):
         keys.append("spring_stiffness_Nm_per_rad")
     if rig.has("load") and kinds - {"locked", "imposed"}:
-        keys += ["load_inertia_kgm2", "load_viscous_Nms_per_rad"]
+        keys.append("load_inertia_kgm2")
+        # one body: the damping that the file leaves out takes what the one that it states may err
+        one_body = not rig.has("spring") and ONE_BODY[1][0] in keys
+        left_out = one_body and rig.motor_viscous_Nms_per_rad is None
+        if not left_out or rig.load_viscous_Nms_per_rad is None:
+            keys.append("load_viscous_Nms_per_rad")
         if kinds & {"pendulum", "contact"} and rig.load_mass_kg and rig.load_distance_m:
             keys += ["load_mass_kg", "gravity_angle_offset_rad"]
     found = []
@@ -177,11 +181,11 @@ def _little(rig: Rig, key: str) -> float:
     k_t = rig.torque_constant_Nm_per_A or 0.0
     k_e = rig.back_emf_constant_Vs_per_rad or k_t
     electric = k_t * k_e / (rig.terminal_resistance_ohm or 1.0)
-    side = 1.0 if key.startswith("motor") else N**2
+    motor = key.startswith("motor")
     if electric == 0.0 or key.startswith("load"):
         inertia = (rig.load_inertia_kgm2 or 0.0) or (rig.motor_inertia_kgm2 or 0.0) * N**2
-        return LITTLE * 10.0 * max(inertia, 1e-6)
-    return LITTLE * electric * side
+        return LITTLE * 10.0 * max(inertia, 1e-6) / (N**2 if motor else 1.0)
+    return LITTLE * electric * (1.0 if motor else N**2)
 
 
 def unstated_std(rig: Rig, key: str) -> float:
