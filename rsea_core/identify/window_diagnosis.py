@@ -8,6 +8,7 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.investigate import investigate
+from rsea_core.identify.law_search.gear_mesh import as_effect
 from rsea_core.identify.multistep.command_timing import RowTimes
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, MESH_DAMPER, RATIO
@@ -62,7 +63,7 @@ def diagnose_windows(
 def _model_laws(conclusion: WindowVerdict) -> tuple:
     """The laws of the model: those found, or the experiment's alone where they were refuted."""
     _, values = conclusion.model_values()
-    pairs = zip(conclusion.model_fit.hypothesis.laws, values, strict=True)
+    pairs = zip(map(as_effect, conclusion.model_fit.hypothesis.laws), values, strict=True)
     return tuple((law, found) for law, found in pairs if _kept(law, found))
 
 

@@ -73,3 +73,8 @@ def _damper(damping: float) -> Law:
         write=writes_numbers(SpringViscoelastic), unknowns=(value,), starts=((damping,),),
         nuisance=True,
     )  # fmt: skip
+
+
+def as_effect(law: Law) -> Law:
+    """The law as `model.toml` holds it: a mesh's damper is a spring's, which the model has."""
+    return replace(law, effect=law.kind.effect) if law.effect == MESH_DAMPER else law

@@ -11,6 +11,7 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import (
+    as_effect,
     encoders_disagree,
     first_laws,
     with_gear_mesh,
@@ -19,6 +20,7 @@ from rsea_core.identify.multistep.criteria import SEARCH_STEPS
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters, with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.recordings.case import read_case
 
 ROW_s, ROWS, FINER = 2e-3, 1500, 200
@@ -111,6 +113,17 @@ def test_the_mesh_with_both_inertias_has_a_mode_of_four_rows(cases):
     assert damper.nuisance
     assert elastic.rig.has("spring")
     assert not cases[WIDTH].rig.has("spring")
+
+
+def test_a_model_with_a_mesh_is_read_again(cases, tmp_path):
+    elastic, (damper,) = with_gear_mesh(cases[WIDTH])
+    values = {"damping_Nms_per_rad": 0.1}
+    model = FoundModel(rig=elastic.rig, contact={}, laws=((as_effect(damper), values),),
+                       ambient_C=25.0)  # fmt: skip
+    path = tmp_path / "model.toml"
+    path.write_text(model.to_toml(), encoding="utf-8")
+    ((law, read),) = FoundModel.from_toml(path).laws
+    assert (law.effect, law.law, read) == ("spring-viscoelastic", "damper", values)
 
 
 def test_no_mesh_joins_a_body_without_inertia(cases):
