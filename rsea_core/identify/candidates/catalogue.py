@@ -37,6 +37,8 @@ def catalogue(case: Case, *, relative: bool = False) -> dict[str, Law]:
     if rig.axis == "linear":
         kinds = [kind for kind in kinds if kind not in ONCE_A_TURN]
     laws = [law for kind in kinds for law in candidates_of(kind, s) if not _on_the_load(law, rig)]
+    if rig.axis == "linear":
+        laws = [law for law in laws if not any(p.name.startswith("wheel_") for p in law.unknowns)]
     return {law.key: law for law in sorted(laws, key=_column)}
 
 

@@ -35,6 +35,18 @@ def test_nothing_happens_once_a_turn_of_a_load_that_moves_along_a_line(tmp_path)
     assert not once_a_turn & effects(tmp_path, replace(axis_rig(), axis="linear"))
 
 
+def test_a_transmission_error_on_a_linear_axis_is_the_screws(tmp_path):
+    def parts(axis: str) -> set[str]:
+        case = axis_case(tmp_path, axis_recording(seed=3), rig=replace(axis_rig(), axis=axis))
+        laws = catalogue(case, relative=True).values()
+        errors = [law for law in laws if law.effect == "gear-transmission-error"]
+        return {p.name.split("_")[0] for law in errors for p in law.unknowns}
+
+    assert "wheel" in parts("rotary")
+    assert "worm" in parts("linear")
+    assert "wheel" not in parts("linear")
+
+
 def test_a_drag_on_a_bare_shaft_acts_in_the_model():
     drag = LoadDrag(torque_at_5_rad_per_s_Nm=0.1)
     plain, with_drag = (
