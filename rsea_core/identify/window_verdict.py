@@ -173,15 +173,13 @@ class WindowVerdict(Conclusion):
         if self.verdict in ("no-mismatch", "parameters-only"):
             return []
         found = []
-        laws = self.fit.hypothesis.laws
-        first = len(laws) - len(self.found.steps)
+        first = len(self.fit.hypothesis.laws) - len(self.found.steps)
         for number, step in enumerate(self.found.steps):
             confidence = self.step_confidence(number)
             if self.verdict == "unexplained":
                 confidence = min(confidence, UNCLAIMED)
             scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
-            others = rivals_of(step.law, step.rivals)
-            alike = [law.effect for law, gain in others if step.gain - gain < scale]
+            alike = [w.effect for w, g in rivals_of(step.law, step.rivals) if step.gain - g < scale]
             found.append(
                 {
                     "name": step.law.effect,

@@ -20,6 +20,7 @@ from dftfs.analysis.meshing.blocks import (
 )
 from dftfs.analysis.meshing.planar_mesh import (
     CoarseMesh,
+    corner_quality,
     joined,
     quad8,
     smoothed,
@@ -32,7 +33,10 @@ from dftfs.spring.edges import Edge, OffsetEdge
 from dftfs.spring.outline import SpringOutline
 
 _FRONTAL_QUADS, _FRONTAL, _MESH_ADAPT, _BLOSSOM = 8, 6, 1, 1
-_OVERLAP = 1e-9  # of a block's area: rounding of sums of areas
+# algorithm, and sizes inside of a root block over those wanted, in the order of the trials
+_TRIED = ((_FRONTAL_QUADS, 1.0), (_FRONTAL, 1.0), (_MESH_ADAPT, 1.0), (_FRONTAL_QUADS, 0.85),
+          (_FRONTAL, 0.85), (_FRONTAL_QUADS, 0.7), (_FRONTAL, 0.7))  # fmt: skip
+_GOOD = 0.1  # corner quality of the worst element; a folded one has none
 _MIN_PIECES = {"notch_fillet": 4, "foot_fillet": 2, "slit_fillet": 4, "tip_fillet": 2}
 
 
@@ -50,11 +54,30 @@ def sector_mesh(outline: SpringOutline, sizing: MeshSizing | None = None) -> Tag
         If gmsh fails or an element is unusable.
     """
     sizing = sizing or MeshSizing()
+    usable = refused = None
+    for tried in _TRIED:  # gmsh folds a block now and then, and does not say so
+        try:
+            mesh = _sector_mesh(outline, sizing, *tried)
+        except MeshError as error:
+            refused = refused or error
+            continue
+        if corner_quality(mesh.nodes[mesh.cells[:, :4]]).min() >= _GOOD:
+            return mesh
+        usable = usable or mesh
+    if usable is None:
+        raise refused
+    return usable
+
+
+def _sector_mesh(
+    outline: SpringOutline, sizing: MeshSizing, algorithm: int, inside: float
+) -> TaggedMesh:
+    """The mesh by one algorithm of gmsh; one whose folds the smoothing leaves is refused."""
     blocks = sector_blocks(outline)
     pieces = [
-        _gmsh_block(outline, blocks.hub_loops, sizing),
+        _gmsh_block(outline, blocks.hub_loops, sizing, algorithm, inside),
         _arm_block(outline, blocks, sizing),
-        _gmsh_block(outline, blocks.rim_loops, sizing),
+        _gmsh_block(outline, blocks.rim_loops, sizing, algorithm, inside),
     ]
     fine = smoothed(split(joined(pieces, internal=CROSS_SECTION)), passes=8)
     nodes, cells, boundaries = quad8(fine)
@@ -118,8 +141,9 @@ def _arm_block(outline: SpringOutline, blocks: SectorBlocks, sizing: MeshSizing)
 
 
 def _gmsh_block(
-    outline: SpringOutline, loops: tuple[tuple[Edge, ...], ...], sizing: MeshSizing
-) -> CoarseMesh:
+    outline: SpringOutline, loops: tuple[tuple[Edge, ...], ...], sizing: MeshSizing,
+    algorithm: int, inside: float,
+) -> CoarseMesh:  # fmt: skip
     """A root block: a band of ordered quadrilaterals along every fillet, gmsh in between.
 
     The band puts the nodes where the stress peaks in rows along the edge, whatever gmsh does.
@@ -138,7 +162,7 @@ def _gmsh_block(
         rings.append(banded_ring(pieces, size, outline.parameters.fillet_radius_m))
     # nodes: what gmsh sees of every ring, then its own, then the boundary under the bands
     polygons = [ring.polygon_m for ring in rings]
-    nodes, faces_inside = _gmsh_faces(polygons, [2 * size(p) for p in polygons])
+    nodes, faces_inside = _gmsh_faces(polygons, [2 * inside * size(p) for p in polygons], algorithm)
     first, covered = 0, len(nodes)
     faces = list(faces_inside)
     for ring in rings:
@@ -178,31 +202,9 @@ def _mirror_cuts(pieces: list[tuple[Edge, float, float]]) -> None:
 
 
 def _gmsh_faces(
-    rings: list[NDArray], sizes: list[NDArray]
-) -> tuple[NDArray, tuple[tuple[int, ...], ...]]:
-    """Mesh between polygons, holes turned the other way; sides stay whole, corners come first.
-
-    Frontal-Delaunay for quads returns a folded mesh now and then (elements that lie over others,
-    stiffness 0.1 % low, with no word from gmsh): the areas show it, and another algorithm is taken.
-    """
-    wanted = abs(sum(_area(ring) for ring in rings))
-    for algorithm in (_FRONTAL_QUADS, _FRONTAL, _MESH_ADAPT):
-        nodes, faces = _generated(rings, sizes, algorithm)
-        if abs(sum(_area(nodes[list(face)]) for face in faces) - wanted) <= _OVERLAP * wanted:
-            return nodes, faces
-    raise MeshError(f"gmsh's elements overlap in a block of {len(rings[0])} sides")
-
-
-def _area(polygon: NDArray) -> float:
-    """Area inside a polygon (n, 2), positive where it turns anticlockwise."""
-    x, y = polygon.T
-    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2
-
-
-def _generated(
     rings: list[NDArray], sizes: list[NDArray], algorithm: int
 ) -> tuple[NDArray, tuple[tuple[int, ...], ...]]:
-    """One mesh by one algorithm of gmsh."""
+    """Mesh between polygons, holes turned the other way; sides stay whole, corners come first."""
     scale = float(np.ptp(rings[0]))
     gmsh.initialize(interruptible=False)
     try:
@@ -253,8 +255,12 @@ def _read_faces(
         for row in np.asarray(flat).reshape(-1, width):
             faces.append(tuple(index[int(n)] for n in row))
     nodes = np.array([position[n] for n in order])
-    return nodes, tuple(_anticlockwise(nodes, face) for face in faces)
+    # all turned alike: an element that lies over others shows by its own sign
+    clockwise = sum(_area(nodes[list(face)]) for face in faces) < 0
+    return nodes, tuple(face[::-1] if clockwise else face for face in faces)
 
 
-def _anticlockwise(nodes: NDArray, face: tuple[int, ...]) -> tuple[int, ...]:
-    return face if _area(nodes[list(face)]) > 0 else face[::-1]
+def _area(polygon: NDArray) -> float:
+    """Area inside a polygon (n, 2), positive where it turns anticlockwise."""
+    x, y = polygon.T
+    return float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2

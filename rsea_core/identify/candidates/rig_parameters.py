@@ -83,18 +83,14 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
     if rig.has("gear"):
         inertia, damping = ONE_BODY
         keys += [_less_certain(rig, inertia), _less_certain(rig, damping)]
-        if keys[-1] is None:  # absent is unknown, not none
+        one_body = not rig.has("spring") and rig.load_viscous_Nms_per_rad is not None
+        if keys[-1] is None and not one_body:  # absent is unknown, not none
             keys.append(damping[0])
         keys += _damping_left_out(rig, keys)
     if rig.has("spring"):
         keys.append("spring_stiffness_Nm_per_rad")
     if rig.has("load") and kinds - {"locked", "imposed"}:
-        keys.append("load_inertia_kgm2")
-        # one body: the damping that the file leaves out takes what the one that it states may err
-        one_body = not rig.has("spring") and ONE_BODY[1][0] in keys
-        left_out = one_body and rig.motor_viscous_Nms_per_rad is None
-        if not left_out or rig.load_viscous_Nms_per_rad is None:
-            keys.append("load_viscous_Nms_per_rad")
+        keys += ["load_inertia_kgm2", "load_viscous_Nms_per_rad"]
         if kinds & {"pendulum", "contact"} and rig.load_mass_kg and rig.load_distance_m:
             keys += ["load_mass_kg", "gravity_angle_offset_rad"]
     found = []
@@ -106,6 +102,8 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
         if key == "load_mass_kg":
             distance = stated.get("load_distance_m", 0.0)
             tolerance = float(np.hypot(tolerance, distance)) if key in stated else tolerance
+        if key == "load_viscous_Nms_per_rad" and value:
+            tolerance = float(np.hypot(tolerance, np.log1p(_left_out_beside(rig) / value)))
         if key in ANGLES:
             found.append(Nominal(key=key, value=value or 0.0, tolerance=tolerance, additive=True))
         elif value:
@@ -138,6 +136,18 @@ def _damping_left_out(rig: Rig, keys: list) -> list[str]:
         damping for inertia, damping in bodies
         if getattr(rig, inertia) and getattr(rig, damping) is None and damping not in keys
     ] if rig.has("spring") else []  # fmt: skip
+
+
+def _left_out_beside(rig: Rig) -> float:
+    """Standard deviation of the damping that the file leaves out of a rigid train, at the load.
+
+    Only the sum with the load's damping is seen, and that value takes it.
+    """
+    _, damping = ONE_BODY
+    stated = any(getattr(rig, key) is not None for key in damping)
+    if rig.has("spring") or not rig.has("gear") or stated or not rig.motor_inertia_kgm2:
+        return 0.0
+    return UNKNOWN * _little(rig, damping[0]) * (rig.gear_ratio or 1.0) ** 2
 
 
 def _drive_keys(commands: set) -> list[str]:

@@ -27,7 +27,7 @@ def edges(gap):
 
 
 @pytest.mark.parametrize("gap", [0.05, 0.3, 1.0, -0.05])
-def test_a_corner_beside_a_curved_edge_is_no_overlap(gap):
+def test_a_corner_near_a_curved_edge_is_no_overlap(gap):
     """Its normal is turned away from the nearest part of that edge, and faces a part behind it."""
     floor, ceiling = edges(gap)
     found = measure_clearance(floor, ceiling, deepest_m=STRIP_mm / 2)
