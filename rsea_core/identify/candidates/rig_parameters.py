@@ -103,7 +103,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             distance = stated.get("load_distance_m", 0.0)
             tolerance = float(np.hypot(tolerance, distance)) if key in stated else tolerance
         if key == "load_viscous_Nms_per_rad" and value:
-            tolerance = float(np.hypot(tolerance, np.log1p(_left_out_beside(rig) / value)))
+            tolerance = float(np.hypot(tolerance, np.log1p(_left_out_of_train(rig) / value)))
         if key in ANGLES:
             found.append(Nominal(key=key, value=value or 0.0, tolerance=tolerance, additive=True))
         elif value:
@@ -138,7 +138,7 @@ def _damping_left_out(rig: Rig, keys: list) -> list[str]:
     ] if rig.has("spring") else []  # fmt: skip
 
 
-def _left_out_beside(rig: Rig) -> float:
+def _left_out_of_train(rig: Rig) -> float:
     """Standard deviation of the damping that the file leaves out of a rigid train, at the load.
 
     Only the sum with the load's damping is seen, and that value takes it.
