@@ -26,8 +26,7 @@ HALVES = 2  # half the width is solved on, by both: the mid-plane is a mirror
 SLAVE_REACH_M, MASTER_REACH_M = 8e-3, 16e-3
 CONTACT_FROM_RAD = 0.18  # before, no coil is near another: CalculiX is spared the search
 DEFLECTIONS_RAD = tuple(np.round(0.03 * np.arange(1, 11), 3).tolist())
-
-LIMIT = f"*CONTROLS, PARAMETERS=FIELD\n{TIGHT_RESIDUAL}\n"  # of `deck`
+LIMIT = f"*CONTROLS, PARAMETERS=FIELD\n{TIGHT_RESIDUAL}\n"  # as `deck` writes it with `tight`
 
 
 def torsion_problem() -> TorsionProblem:
@@ -98,7 +97,7 @@ def paired_deck(
     stiffness : float
         Of the linear pressure-overclosure, Pa/m.
     tight : bool
-        Lower limit of the residual in steps without contact: the default leaves 1 % of the torque.
+        Lower the limit of the residual in steps without contact, as `deck` does.
     """
     lines = [
         "*NSET, NSET=MIRROR",

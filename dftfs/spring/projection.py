@@ -71,7 +71,8 @@ def _nearest(points, normals, polyline, other, deepest):
     n, m = len(points), len(polyline) - 1
     gap, foot, segment = np.full(n, np.inf), np.full((n, 2), np.nan), np.full(n, -1)
     for i in range(n):
-        nearest, ahead, behind = np.inf, np.inf, np.inf  # of all segments, of those that face
+        # distances: to any segment, and to those that face the point, outside and inside
+        nearest, ahead, behind = np.inf, np.inf, np.inf
         at_ahead, at_behind = -1, -1
         for k in range(m):
             facing = normals[i, 0] * other[k, 0] + normals[i, 1] * other[k, 1] < _FACING
@@ -87,7 +88,7 @@ def _nearest(points, normals, polyline, other, deepest):
                     ahead, at_ahead = distance, k
             elif distance < min(behind, deepest):
                 behind, at_behind = distance, k
-        # edges that overlap are nowhere nearer to each other than where they face each other
+        # no overlap if another part of the edge is nearer: a tip's corner faces parts further on
         if behind > nearest:
             behind = np.inf
         k = at_ahead if ahead <= behind else at_behind

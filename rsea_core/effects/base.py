@@ -176,7 +176,7 @@ class Term(ABC):
     replaces : str or None
         The rig value whose nominal law it stands in for; None when it adds to the nominal law.
     generalises : str or None
-        The effect that this one is where its further values are zero: no rival of it.
+        The effect that this one reduces to if its further values are zero: it is no rival of it.
     in_spring_table : bool
         Whether it is nothing but a change of the spring's elastic law (`on_spring`).
     headline : str

@@ -14,7 +14,7 @@ import numpy as np
 
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
-from rsea_core.identify.law_search.hold_out import with_all_loads
+from rsea_core.identify.law_search.hold_out import with_shared_recordings
 from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
@@ -37,7 +37,7 @@ def investigate(
     quick : bool
         Finish fewer candidates, each from one start.
     """
-    case, shared = with_all_loads(case)
+    case, shared = with_shared_recordings(case)
     for file, why in shared.items():
         say(f"{file}: two thirds are fitted: {why}")
     found = begun(case, None, say, quick=quick)

@@ -33,10 +33,11 @@ from dftfs.spring.edges import Edge, OffsetEdge
 from dftfs.spring.outline import SpringOutline
 
 _FRONTAL_QUADS, _FRONTAL, _MESH_ADAPT, _BLOSSOM = 8, 6, 1, 1
-# algorithm, and sizes inside of a root block over those wanted, in the order of the trials
+# gmsh folds a block now and then without an error: algorithms and factors of the element size
+# inside the root blocks, in the order in which they are tried
 _TRIED = ((_FRONTAL_QUADS, 1.0), (_FRONTAL, 1.0), (_MESH_ADAPT, 1.0), (_FRONTAL_QUADS, 0.85),
           (_FRONTAL, 0.85), (_FRONTAL_QUADS, 0.7), (_FRONTAL, 0.7))  # fmt: skip
-_GOOD = 0.1  # corner quality of the worst element; a folded one has none
+_SUFFICIENT = 0.1  # lowest corner quality of a mesh that ends the trials; not above 0: folded
 _MIN_PIECES = {"notch_fillet": 4, "foot_fillet": 2, "slit_fillet": 4, "tip_fillet": 2}
 
 
@@ -54,25 +55,27 @@ def sector_mesh(outline: SpringOutline, sizing: MeshSizing | None = None) -> Tag
         If gmsh fails or an element is unusable.
     """
     sizing = sizing or MeshSizing()
-    usable = refused = None
-    for tried in _TRIED:  # gmsh folds a block now and then, and does not say so
+    best, highest, refused = None, 0.0, None
+    for tried in _TRIED:
         try:
             mesh = _sector_mesh(outline, sizing, *tried)
         except MeshError as error:
             refused = refused or error
             continue
-        if corner_quality(mesh.nodes[mesh.cells[:, :4]]).min() >= _GOOD:
-            return mesh
-        usable = usable or mesh
-    if usable is None:
-        raise refused
-    return usable
+        quality = corner_quality(mesh.nodes[mesh.cells[:, :4]]).min()
+        if quality > highest:
+            best, highest = mesh, quality
+        if quality >= _SUFFICIENT:
+            break
+    if best is None:
+        raise refused or MeshError("gmsh's elements overlap in the hub's or the rim's block")
+    return best
 
 
 def _sector_mesh(
     outline: SpringOutline, sizing: MeshSizing, algorithm: int, inside: float
 ) -> TaggedMesh:
-    """The mesh by one algorithm of gmsh; one whose folds the smoothing leaves is refused."""
+    """The mesh by one algorithm of gmsh, elements inside the root blocks smaller by a factor."""
     blocks = sector_blocks(outline)
     pieces = [
         _gmsh_block(outline, blocks.hub_loops, sizing, algorithm, inside),
@@ -255,7 +258,7 @@ def _read_faces(
         for row in np.asarray(flat).reshape(-1, width):
             faces.append(tuple(index[int(n)] for n in row))
     nodes = np.array([position[n] for n in order])
-    # all turned alike: an element that lies over others shows by its own sign
+    # one orientation for all: a folded element keeps its negative area until smoothing unfolds it
     clockwise = sum(_area(nodes[list(face)]) for face in faces) < 0
     return nodes, tuple(face[::-1] if clockwise else face for face in faces)
 

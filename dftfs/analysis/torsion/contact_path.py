@@ -21,7 +21,8 @@ _FURTHER_STATES = 20
 _GRAZED = 1.01  # of the first contact's deflection: the first state in contact
 _AFTER = 1.05  # where the tangent beyond the knee is read: past the contact's smoothing
 _GAP_GONE = 1e-4  # of the strip's thickness: the gap at the onset is less than this
-_MOST_REFINEMENTS, _INTERPOLATED = 16, 4  # solves for the first contact; of these by interpolation
+_MOST_REFINEMENTS = 16  # solves for the first contact: first by interpolation, then by bisection
+_INTERPOLATED = 4
 _SAME_STATE = 0.01  # an evenly spaced state this near the first contact adds nothing
 _ESTIMATE_STEP_RAD = 0.03
 FARTHEST_RAD = 1.0  # where a direction ends if its coils have not touched
@@ -207,8 +208,9 @@ def _touch(
     for number in range(_MOST_REFINEMENTS):
         last = next(k for k, (_, gap) in enumerate(known) if gap <= 0)
         here = known[max(0, last - 2) : last + 1]
-        zero = _zero([state for state, _ in here], [gap for _, gap in here])
-        if number >= _INTERPOLATED:  # the nearest places of the edges change: halve the bracket
+        if number < _INTERPOLATED:
+            zero = _zero([state for state, _ in here], [gap for _, gap in here])
+        else:  # a gap with a kink, where other points of the edges become the nearest
             zero = (known[last - 1][0].t + known[last][0].t) / 2
         found = _between(known[last - 1][0], known[last][0], zero)
         if abs(zero - known[last - 1][0].t) < 1e-6 or abs(zero - known[last][0].t) < 1e-6:

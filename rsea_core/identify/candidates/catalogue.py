@@ -54,7 +54,7 @@ def of_one_body(rig: Rig) -> set[str]:
 
 
 def rivals_of(law: Law, others: Iterable[tuple[Law, float]]) -> list[tuple[Law, float]]:
-    """Of laws and their gains those that are another explanation: none that contains the law."""
+    """Laws and their gains, without laws of an effect that generalises the law's own."""
     return [(w, gain) for w, gain in others if w.kind is None or w.kind.generalises != law.effect]
 
 

@@ -103,7 +103,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             distance = stated.get("load_distance_m", 0.0)
             tolerance = float(np.hypot(tolerance, distance)) if key in stated else tolerance
         if key == "load_viscous_Nms_per_rad" and value:
-            tolerance = float(np.hypot(tolerance, np.log1p(_left_out_of_train(rig) / value)))
+            tolerance = float(np.hypot(tolerance, np.log1p(_unstated_damping_std(rig) / value)))
         if key in ANGLES:
             found.append(Nominal(key=key, value=value or 0.0, tolerance=tolerance, additive=True))
         elif value:
@@ -138,10 +138,10 @@ def _damping_left_out(rig: Rig, keys: list) -> list[str]:
     ] if rig.has("spring") else []  # fmt: skip
 
 
-def _left_out_of_train(rig: Rig) -> float:
-    """Standard deviation of the damping that the file leaves out of a rigid train, at the load.
+def _unstated_damping_std(rig: Rig) -> float:
+    """Standard deviation, at the load, of a motor damping that a rigid train's file leaves out.
 
-    Only the sum with the load's damping is seen, and that value takes it.
+    Only its sum with the load's damping is identifiable: it widens the prior of the latter.
     """
     _, damping = ONE_BODY
     stated = any(getattr(rig, key) is not None for key in damping)

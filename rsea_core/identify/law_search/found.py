@@ -66,7 +66,7 @@ class Found:
     refused : Step or None
         A law taken and taken out again, for it gained in too few stretches of rows.
     shared : dict of str
-        Recordings held out of which a part was fitted, and why (`hold_out.with_all_loads`).
+        Recordings held out of which a part was fitted, and why (`hold_out.with_shared_recordings`).
     left_by_parameters : float
         What parameters alone leave of whole recordings, in deviations of the sensors' noise
         (`whole_runs`); inf: not known.

@@ -76,5 +76,5 @@ def _damper(damping: float) -> Law:
 
 
 def as_effect(law: Law) -> Law:
-    """The law as `model.toml` holds it: a mesh's damper is a spring's, which the model has."""
+    """The law as `model.toml` states it: the damper of a mesh that is the model's spring."""
     return replace(law, effect=law.kind.effect) if law.effect == MESH_DAMPER else law

@@ -2,9 +2,9 @@
 
 Recordings that the case holds out serve as they are. A case without any, or with such that the
 laws do not concern, lends the last quarter of
-each recording: both hypotheses are fitted to the rows before it once more. Where only recordings
-held out let the load move, or meet a contact, the others say nothing of it: two thirds of these are
-fitted then, and the last third stays held out.
+each recording: both hypotheses are fitted to the rows before it once more. If only
+recordings held out let the load move, or include a contact, the others show nothing of it: two
+thirds of these are fitted then, and the last third stays held out.
 """
 
 from dataclasses import dataclass, replace
@@ -36,8 +36,15 @@ def part_of(r: Recording, first: int, last: int, **changes) -> Recording:
     return replace(r, columns=columns, logged=logged, **begun, **changes)
 
 
-def with_all_loads(case: Case) -> tuple[Case, dict[str, str]]:
-    """The case with loads that only recordings held out have among the fitted, and why, by file."""
+def with_shared_recordings(case: Case) -> tuple[Case, dict[str, str]]:
+    """The case with two thirds of the recordings fitted that alone show a kind of load.
+
+    Returns
+    -------
+    Case
+    dict of str
+        Why each of these recordings is shared, by file.
+    """
     kinds = {r.load.kind for r in case.identification}
     recordings, shared = [], {}
     for r in case.recordings:
@@ -54,11 +61,11 @@ def with_all_loads(case: Case) -> tuple[Case, dict[str, str]]:
 
 
 def _only_there(kind: str, fitted: set[str]) -> str | None:
-    """What a recording with such a load shows that none with the fitted loads does."""
+    """What only a recording with this kind of load shows; None if a fitted one shows it too."""
     if kind not in HELD and fitted <= set(HELD):
         return "no other recording lets the load move"
     if kind == "contact" and kind not in fitted:
-        return "no other recording meets a contact"
+        return "no other recording includes a contact"
     return None
 
 

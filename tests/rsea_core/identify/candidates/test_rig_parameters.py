@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from rsea_core.identify.candidates.rig_parameters import held_jointly, nominals, unstated_std
+from rsea_core.machine.tolerances import TOLERANCES
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 RATIO = 5.0
@@ -43,3 +44,19 @@ def test_what_is_held_jointly_with_a_free_value_counts_on_that_values_side_of_th
     assert held_jointly(rig, "output_inertia_kgm2") == pytest.approx(1e-3 * RATIO**2)
     assert unstated_std(rig, "motor_inertia_kgm2") == pytest.approx(0.3 * 0.02 / RATIO**2)
     assert unstated_std(rig, "output_inertia_kgm2") == pytest.approx(0.1 * 1e-3 * RATIO**2)
+
+
+def load_damping_tolerance(case, **values):
+    rig = replace(axis_rig(), gear_ratio=RATIO, **values)
+    found = {p.key: p.tolerance for p in nominals(replace(case, rig=rig))}
+    return found["load_viscous_Nms_per_rad"]
+
+
+def test_unstated_damping_of_a_rigid_train_widens_the_prior_of_the_loads_damping(case):
+    stated = load_damping_tolerance(case, motor_viscous_Nms_per_rad=1e-4)
+    assert stated == TOLERANCES["load_viscous_Nms_per_rad"]
+    assert load_damping_tolerance(case) > 1.3 * stated
+    assert load_damping_tolerance(case, motor_viscous_Nms_per_rad=0.0) == stated
+    assert load_damping_tolerance(case, motor_inertia_kgm2=0.0) == stated  # no body, no damping
+    spring = {"parts": ("drive", "gear", "spring", "load"), "spring_stiffness_Nm_per_rad": 5.0}
+    assert load_damping_tolerance(case, **spring) == stated  # both bodies are seen
