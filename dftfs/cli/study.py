@@ -48,6 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     design, say = read_design(arguments), progress()
     check_friction(arguments)
     check_inertia(arguments)
+    mesh = mesh_of(arguments, design)
     default = resources.files("dftfs") / "examples" / "torque-1hz.toml"
     scenario = Scenario.from_toml(arguments.scenario or Path(str(default)))
     folder = prepare_folder(arguments.out or default_folder(arguments, f"study-{design.name}"))
@@ -60,7 +61,7 @@ def run(arguments: argparse.Namespace) -> int:
             loop_end=lambda free: loop_end(arguments, free),
             load_inertia_kg_m2=arguments.load_inertia,
             hub_inertia_kg_m2=arguments.hub_inertia,
-            mesh=mesh_of(arguments, design),
+            mesh=mesh,
             author=arguments.author,
         ),
         on_progress=say,

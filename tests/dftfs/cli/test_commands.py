@@ -204,6 +204,14 @@ BAD_OF_CAD = [
 ]
 
 
+@pytest.mark.needs_cad
+def test_a_study_with_a_wrong_mesh_leaves_no_folder(run, tmp_path):
+    status, _, error = run("study", "al1", "--layers", "0", "--out", str(tmp_path / "s"))
+    assert status == 2
+    assert "layers = 0 must be 1 to 32" in error
+    assert not (tmp_path / "s").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "status", "message"),
     [*BAD, *(pytest.param(*row, marks=pytest.mark.needs_cad) for row in BAD_OF_CAD)],
