@@ -52,6 +52,7 @@ from rsea_core.identify.multistep.experiment import (
 from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS, estimated_noise
 from rsea_core.identify.multistep.tracks import (
     Track,
+    about,
     block_rows,
     initial_track,
     prepared,
@@ -83,7 +84,7 @@ def smooth(estimator: Estimator, h: Hypothesis, x: NDArray) -> None:
         residual = e.measured - e.readings(run, machine, t.windows)[0]
         if np.all(np.isfinite(residual)) and np.max(np.abs(residual)) < 1e12:
             with suppress(np.linalg.LinAlgError):  # the motion before stays
-                t = resmoothed(t, run[0], residual)
+                t = resmoothed(about(t, machine[0]), run[0], residual)
         found.append(t)
     estimator.tracks = found
 
@@ -95,7 +96,9 @@ def with_noise(
     residuals = [r[0] for r in estimator.residuals([(h, x)])]
     if not all(np.all(np.isfinite(r)) for r in residuals):
         return estimator
-    return estimator.having(estimated_noise(estimator.tracks, residuals, steps=steps))
+    own = estimator.problem.trial_machine
+    tracks = [about(t, own(t.experiment, h, x)) for t in estimator.tracks]
+    return estimator.having(estimated_noise(tracks, residuals, steps=steps))
 
 
 def with_output_error(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimator:
