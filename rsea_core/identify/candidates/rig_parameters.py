@@ -96,12 +96,11 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
     found = []
     for key in filter(None, keys):
         value = getattr(rig, key)
-        if key in rig.anchors or (key == "load_mass_kg" and "load_distance_m" in rig.anchors):
+        tolerance = 0.0 if key in rig.anchors else stated.get(key, TOLERANCES[key])
+        if key == "load_mass_kg" and "load_distance_m" not in rig.anchors:
+            tolerance = float(np.hypot(tolerance, stated.get("load_distance_m", 0.0)))
+        if tolerance == 0.0:
             continue
-        tolerance = stated.get(key, TOLERANCES[key])
-        if key == "load_mass_kg":
-            distance = stated.get("load_distance_m", 0.0)
-            tolerance = float(np.hypot(tolerance, distance)) if key in stated else tolerance
         if key == "load_viscous_Nms_per_rad" and value:
             tolerance = float(np.hypot(tolerance, np.log1p(_unstated_damping_std(rig) / value)))
         if key in ANGLES:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from rsea_core.identify.candidates.rig_parameters import held_jointly, nominals, unstated_std
+from rsea_core.machine.inputs import Load
 from rsea_core.machine.tolerances import TOLERANCES
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -60,3 +61,27 @@ def test_unstated_damping_of_a_rigid_train_widens_the_prior_of_the_loads_damping
     assert load_damping_tolerance(case, motor_inertia_kgm2=0.0) == stated  # no body, no damping
     spring = {"parts": ("drive", "gear", "spring", "load"), "spring_stiffness_Nm_per_rad": 5.0}
     assert load_damping_tolerance(case, **spring) == stated  # both bodies are seen
+
+
+@pytest.mark.parametrize(
+    ("anchors", "tolerances", "expected"),
+    [
+        ((), {}, TOLERANCES["load_mass_kg"]),
+        ((), {"load_mass_kg": 0.003, "load_distance_m": 0.004}, 0.005),
+        (("load_mass_kg",), {"load_mass_kg": 0.003, "load_distance_m": 0.004}, 0.004),
+        (("load_mass_kg",), {}, None),
+        (("load_distance_m",), {"load_mass_kg": 0.003, "load_distance_m": 0.004}, 0.003),
+        (("load_mass_kg", "load_distance_m"), {"load_distance_m": 0.004}, None),
+    ],
+)
+def test_a_weight_is_as_uncertain_as_mass_and_distance_together(
+    tmp_path, anchors, tolerances, expected
+):
+    """A mass that was weighed does not settle the weight's torque where its distance is stated."""
+    rig = replace(
+        axis_rig(), load_mass_kg=2.0, load_distance_m=0.1, anchors=anchors,
+        tolerances=tuple(tolerances.items()),
+    )  # fmt: skip
+    recording = replace(axis_recording(seed=1), load=Load(kind="pendulum"))
+    found = {p.key: p.tolerance for p in nominals(axis_case(tmp_path, recording, rig=rig))}
+    assert found.get("load_mass_kg") == (None if expected is None else pytest.approx(expected))
