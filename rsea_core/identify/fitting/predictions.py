@@ -79,6 +79,8 @@ def run_machines(
     else:
         out = replay.run_cover(numbers, windows.rows, starts, failures="nan")
     out[lost] = np.nan
+    for run, d in zip(out, machines, strict=True):
+        turn_back(run, d, where)
     return out
 
 
@@ -105,7 +107,7 @@ def starts_of(
         for y, d in zip(starts, machines, strict=True):
             y[list(SLIP_STATES)] *= d.start_remembered
     for y, d in zip(starts, machines, strict=True):
-        shift_starts(y, d, where.ratio)
+        shift_starts(y, d, where)
         _rest(y if windows is None else y[0], d)
     return starts, _without_start(starts)
 
@@ -141,15 +143,27 @@ def _without_start(starts: NDArray) -> NDArray:
     return lost
 
 
-def shift_starts(y: NDArray, d: TrialMachine, ratio: float) -> None:
-    """Bring start states (..., N_STEP_STATES) from what sensors misread to what is true."""
+def shift_starts(y: NDArray, d: TrialMachine, where: RunConditions) -> None:
+    """Bring start states (..., N_STEP_STATES) from what sensors misread to what is true.
+
+    An imposed load moves as its sensor reads. Where that has an offset the machine runs in angles
+    that are turned by it, and its run is turned back (`turn_back`).
+    """
     if d.start_load_scale != 1.0:
         y[..., list(LOAD_STATES + LOAD_SPEEDS)] *= d.start_load_scale
     if d.start_motor_scale != 1.0:
         y[..., list(WHEEL_STATES + WHEEL_SPEEDS)] *= d.start_motor_scale
     if d.start_load_rad or d.start_motor_rad:
-        y[..., list(LOAD_STATES)] += d.start_load_rad
-        y[..., list(WHEEL_STATES)] += d.start_motor_rad / ratio
+        turned = d.start_load_rad if where.kind == "imposed" else 0.0
+        y[..., list(LOAD_STATES)] += d.start_load_rad - turned
+        y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio - turned
+
+
+def turn_back(run: NDArray, d: TrialMachine, where: RunConditions) -> None:
+    """Bring the angles of a run (n, 7) from those in which an imposed load moves to the true."""
+    if where.kind == "imposed" and d.start_load_rad:
+        run[:, CHANNELS.index("motor_angle_rad")] += where.ratio * d.start_load_rad
+        run[:, CHANNELS.index("load_angle_rad")] += d.start_load_rad
 
 
 def _rest(y: NDArray, d: TrialMachine) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.variant import TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
-from rsea_core.identify.fitting.predictions import shift_starts, undeflect_link
+from rsea_core.identify.fitting.predictions import shift_starts, turn_back, undeflect_link
 from rsea_core.identify.fitting.problem import Bench, Problem
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 
@@ -108,12 +108,13 @@ def predict_many(
     starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
     undeflect_link(starts)
     for y, d in zip(starts, machines, strict=True):  # the smoothed motion is what sensors read
-        shift_starts(y, d, bench.where.ratio)
+        shift_starts(y, d, bench.where)
     runs = replay.run_windows(numbers, windows, starts, failures="nan", parallel=len(numbers) > 1)
     found: list[list[NDArray]] = [[] for _ in machines]
     for w, run in enumerate(runs):
         first, last = windows[w]
         for i, d in enumerate(machines):
+            turn_back(run[i], d, bench.where)
             found[i].append(_readings(run[i], d, bench, slice(first, last + 1)))
     return found
 

@@ -16,6 +16,7 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     PER_VALUE,
+    RICHER_GAIN,
     SOUND,
     UNPREDICTED,
     WHOLE_LAWS,
@@ -23,7 +24,12 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
-from rsea_core.identify.whole_runs.search import Trial, WholeSearch, best_of_each_effect
+from rsea_core.identify.whole_runs.search import (
+    Trial,
+    WholeSearch,
+    best_of_each_effect,
+    worth,
+)
 from rsea_core.identify.whole_runs.sensor_noise import (
     excess,
     in_noise_left_by,
@@ -218,15 +224,18 @@ def _complete(found: Found, search: WholeSearch) -> Found:
     own.tempering = independent_share(own, fit.hypothesis, fit.x)
     fit = own.fit(fit.hypothesis, fit.x, iterations=4)
     steps = []
-    for law in search.taken:
+    for law in [w for w in fit.hypothesis.laws if any(w is other for other in search.taken)]:
         alone = len(search.taken) == 1
         less = search.plain if alone else without(search.own, search.fit, law)
         gain = less.cost - search.fit.cost - PER_VALUE * count_values(law)
-        rivals = [t for t in best_of_each_effect(search.rivals[law.key]) if t.law is not law]
+        trials = best_of_each_effect(search.rivals[law.key])
+        rivals = [t for t in trials if t.law is not law]
+        mine = gain - RICHER_GAIN * count_values(law)
+        mine = next((worth(t) for t in search.rivals[law.key] if t.law is law), mine)
         steps.append(
             Step(law=law, screened=gain, gain=gain, ratio=search.ratios[law.key],
-                 tempering=own.tempering, rivals=tuple((t.law, t.gain) for t in rivals),
-                 doubt=search.doubt())
+                 tempering=own.tempering, doubt=search.doubt(),
+                 rivals=tuple((t.law, gain + worth(t) - mine) for t in rivals))
         )  # fmt: skip
     return replace(
         found, estimator=own, best=fit, steps=steps, horizon=None, base_shapes=[], shapes=[],

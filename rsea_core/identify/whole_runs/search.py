@@ -30,6 +30,7 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSES,
     QUICK_ITERATIONS,
+    RICHER_GAIN,
     RIVAL_SCALE,
     UNPREDICTED,
     WHOLE_FORMS,
@@ -340,12 +341,18 @@ def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[T
     return sorted(found, key=lambda t: -t.gain)
 
 
+def worth(trial: Trial) -> float:
+    """What a law gains over its rivals: errors that depend on each other feign some for a value."""
+    return trial.gain - RICHER_GAIN * count_values(trial.law)
+
+
 def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
     Every machine has friction: where it explains as much, no dead zone of the drive is named.
     """
-    alike = [t for t in trials if t.gain > trials[0].gain - doubt]
+    best = max(map(worth, trials))
+    alike = [t for t in trials if worth(t) > best - doubt]
     return min(
         alike, key=lambda t: (t.law.effect == DriveDeadZone.effect, count_values(t.law), -t.gain)
     )

@@ -8,15 +8,16 @@ import pytest
 from rsea_core.effects.load_drag import LoadDrag
 from rsea_core.effects.spring_parallel import SpringParallel, StiffeningParallel
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.law_search.candidate_fits import settled
+from rsea_core.identify.law_search.candidate_fits import count_values, settled
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.law_search.screening import screen
+from rsea_core.identify.law_search.screening import Candidate, screen
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.criteria import COMPLETE, INCOMPLETE
 from rsea_core.identify.multistep.horizons import parameters_with_timing, with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
+from rsea_core.identify.whole_runs.search import Trial, worth
 from rsea_core.identify.whole_runs.sensor_noise import in_noise_left_by, in_sensor_noise, misfit
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -134,3 +135,20 @@ def test_two_effects_are_found_one_after_the_other(tmp_path):
     found, _ = with_whole_runs(parameters_alone(tmp_path, *terms), lambda text: None)
     assert found.complete
     assert {step.law.effect for step in found.steps} == {SpringParallel.effect, LoadDrag.effect}
+    laws = found.best.hypothesis.laws[-len(found.steps) :]
+    assert [step.law for step in found.steps] == list(laws)  # figures are told apart by their order
+
+
+def test_a_law_of_many_values_must_gain_more_for_each_to_take_a_plainer_ones_place(sound):
+    laws = {law.key: law for law in laws_of(sound)}
+    one, many = laws["spring-parallel/linear"], laws["gear-friction/stribeck"]
+    more = count_values(many) - count_values(one)
+    assert more >= 1
+    plain = Trial(candidate=candidate_of(one), fit=sound.base, gain=1000.0, left=1.0)
+    flexible = replace(plain, candidate=candidate_of(many))
+    assert worth(replace(flexible, gain=1000.0 + 4.0 * more)) < worth(plain)
+    assert worth(replace(flexible, gain=1000.0 + 6.0 * more)) > worth(plain)
+
+
+def candidate_of(law):
+    return Candidate(law=law, start=law.starts[0], gain=0.0, held_out=0.0, deviation=0.0, size=1.0)
