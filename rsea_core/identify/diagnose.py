@@ -14,7 +14,7 @@ import numpy as np
 
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
-from rsea_core.identify.multistep.criteria import DOUBTED_SHARE, NEEDS_NO_WINDOWS
+from rsea_core.identify.multistep.criteria import DOUBTED_SHARE, NEEDS_NO_WINDOWS, NO_PREDICTION
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.recordings.case import Case
@@ -107,6 +107,8 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
         return first  # a law with a name is no worse for a table that predicts better
     nothing_found = verdicts[1] in ("no-mismatch", "parameters-only")
     own = np.inf if nothing_found else held_out_error(other, "parameters_only")
+    if theirs > NO_PREDICTION:
+        return first  # nothing holds the machine where free runs begin: no opinion
     return other if theirs < BETTER * mine and held_out_error(other) < own else first
 
 

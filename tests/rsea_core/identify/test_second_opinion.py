@@ -1,0 +1,45 @@
+"""A second opinion by free runs replaces the first only where it predicts, and clearly better."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+
+from rsea_core.identify.diagnose import diagnose
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+
+HERE = "rsea_core.identify.diagnose"
+
+
+def opinion(error: float, alone: float):
+    """A diagnosis whose free runs err by a share of the recordings' spread."""
+    rows = [
+        {"role": role, "nrmse_after": error, "nrmse_parameters_only": alone}
+        for role in ("identification", "validation")
+    ]
+    found = SimpleNamespace(complete=False, explained=0.0)
+    doubtful = SimpleNamespace(found=found, estimator=SimpleNamespace(tempering=0.1))
+    document = {"verdict": "missing-physics", "fit": {"recordings": rows}}
+    return SimpleNamespace(document=document, conclusion=doubtful)
+
+
+@pytest.mark.parametrize(
+    ("windows", "free_runs", "taken"),
+    [
+        (0.30, 0.10, "free runs"),
+        (0.30, 0.29, "windows"),  # no clear difference
+        (4.20, 2.10, "windows"),  # both err by more than the machine moves
+    ],
+)
+def test_free_runs_replace_windows_only_where_they_predict_clearly_better(
+    tmp_path, monkeypatch, windows, free_runs, taken
+):
+    """A floating stage: of two useless free runs the better one renamed its motor's cogging."""
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    held_out = replace(case.recordings[0], role="validation")
+    case = replace(case, recordings=(*case.recordings, held_out))
+    alone = 10.0 * max(windows, free_runs)
+    opinions = {"windows": opinion(windows, alone), "free runs": opinion(free_runs, alone)}
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
+    assert diagnose(case) is opinions[taken]
