@@ -20,7 +20,8 @@ from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.multistep.tracks import Track
 from rsea_core.identify.smoothing.error_model import one_body
 
-HATS = 7
+HATS, FRICTION_HATS = 7, 15
+FRICTION = ", against the motion"  # after an angle: a torque that changes its sign with the speed
 PORTS = {"G": "gear", "L": "load", "S": "spring", "V": "drive"}
 
 
@@ -68,7 +69,8 @@ def shapes(projection: Projection) -> list[Shape]:
         for signal in _signals(tracks[0], port):
             values = [_signal(t, signal) for t in tracks]
             both = np.concatenate(values)
-            nodes = np.unique(np.quantile(both, np.linspace(0.02, 0.98, HATS)))
+            hats = FRICTION_HATS if signal.endswith(FRICTION) else HATS
+            nodes = np.unique(np.quantile(both, np.linspace(0.02, 0.98, hats)))
             if nodes.size < 4:
                 continue
             columns = []
@@ -80,7 +82,8 @@ def shapes(projection: Projection) -> list[Shape]:
                     scale = (
                         t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
                     )
-                    part.append(response(t, port, scale * np.interp(v, nodes, height)))
+                    torque = scale * np.interp(v, nodes, height) * _direction(t, signal)
+                    part.append(response(t, port, torque))
                 moved = [e + c for e, c in zip(projection.level, part, strict=True)]
                 columns.append(projection.column(moved))
             judged = projection.judged(np.array(columns))
@@ -115,7 +118,8 @@ def ports(t: Track) -> tuple[str, ...]:
 
 def _signals(t: Track, port: str) -> tuple[str, ...]:
     plant = machine_of(t.experiment.base)
-    body = {"G": ("wheel speed", "wheel angle", "current"), "L": ("load speed", "load angle"),
+    body = {"G": ("wheel speed", "wheel angle", "current", "wheel angle" + FRICTION),
+            "L": ("load speed", "load angle", "load angle" + FRICTION),
             "S": ("deflection", "deflection rate"), "V": ("current",)}[port]  # fmt: skip
     more = ("command",) if t.experiment.recording.command_name and port in "GV" else ()
     if port == "G" and plant.structure == mp.RIGID_FREE:
@@ -123,8 +127,15 @@ def _signals(t: Track, port: str) -> tuple[str, ...]:
     return (*body, *more)
 
 
+def _direction(t: Track, signal: str) -> NDArray | float:
+    """By which a shape's torque (n,) is multiplied: the direction that friction has, or one."""
+    if not signal.endswith(FRICTION):
+        return 1.0
+    return -np.sign(t.motion[:, k.WW if signal.startswith("wheel") else k.WL])
+
+
 def _signal(t: Track, name: str) -> NDArray:
-    m = t.motion
+    m, name = t.motion, name.removesuffix(FRICTION)
     if name == "command":
         r = t.experiment.recording
         return np.asarray(r[r.command_name])
@@ -137,7 +148,7 @@ def _signal(t: Track, name: str) -> NDArray:
 
 def response(t: Track, port: str, signal: NDArray) -> NDArray:
     """Change (n, p) of the innovations by a signal (n,) at a port."""
-    errors, plant = t.errors, machine_of(t.experiment.base)
+    errors, plant = t.errors, t.plant
     states, h = errors.states, t.experiment.recording.sample_time_s * t.block
     signal = t.averaged(signal[:, None])[:, 0]
     d, n = errors.A.shape[1], len(states)
@@ -162,7 +173,7 @@ def response(t: Track, port: str, signal: NDArray) -> NDArray:
     B = np.zeros((len(errors.A), d))
     for j in np.unique(errors.mode):
         full = linear_plant(
-            plant, tangent=t.experiment.stiffness,
+            plant, tangent=t.stiffness,
             gravity_stiffness=plant.gravity * (-1.0 + 2.0 * (j % 5) / 4.0), in_contact=bool(j >= 5),
         ).A  # fmt: skip
         full = one_body(full) if rigid else full

@@ -1,0 +1,61 @@
+"""A torque of unknown shape is seen where it acts, also in a narrow range of the angle."""
+
+import numpy as np
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.screening import Projection
+from rsea_core.identify.law_search.shape_search import FRICTION, shapes
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.horizons import parameters
+from rsea_core.machine.inputs import Load
+from rsea_core.recordings.recording import Recording
+from tests.cases.one_axis import COUNTS, axis_case, axis_rig
+
+ROW_s, ROWS, PARTS = 0.01, 2000, 10
+RUB_Nm, RUB_AT_rad, RUB_WIDTH_rad = 0.06, 0.4, 0.2
+
+
+def rubbed_axis(rub_Nm: float) -> Recording:
+    """An axis that rubs in one range of its angle, in steps of 1 ms, and swings over it."""
+    rig = axis_rig()
+    inertia = rig.motor_inertia_kgm2 + rig.load_inertia_kgm2
+    tau = ROW_s * np.arange(ROWS)
+    goal = 0.7 * np.sin(1.9 * tau) + 0.4 * np.sin(4.3 * tau + 1.0)
+    current, angle = np.zeros(ROWS), np.zeros(ROWS)
+    theta = omega = 0.0
+    for row in range(ROWS):
+        angle[row] = theta
+        current[row] = 1.5 * (goal[row] - theta) - 0.15 * omega
+        for _ in range(PARTS):
+            rub = rub_Nm * (abs(theta - RUB_AT_rad) < RUB_WIDTH_rad) * np.tanh(omega / 0.01)
+            torque = rig.torque_constant_Nm_per_A * current[row] - rub
+            torque -= rig.load_viscous_Nms_per_rad * omega
+            omega += torque / inertia * ROW_s / PARTS
+            theta += omega * ROW_s / PARTS
+    count = 2.0 * np.pi / COUNTS
+    columns = {
+        "time_s": tau, "current_command_A": current,
+        "motor_angle_rad": np.floor(angle / count) * count,
+    }  # fmt: skip
+    return Recording(
+        file="rub.csv", load=Load(kind="free"), columns=columns, sample_time_s=ROW_s,
+        initial_rest=True,
+    )  # fmt: skip
+
+
+def best_shape(folder, rub_Nm: float):
+    case = axis_case(folder, rubbed_axis(rub_Nm), rig=axis_rig())
+    estimator, base, _ = parameters(MultistepProblem(case), Hypothesis(), lambda text: None)
+    return shapes(Projection(estimator, base))[0]
+
+
+def test_friction_in_a_narrow_range_of_the_angle_is_a_shape_against_the_motion(tmp_path):
+    best = best_shape(tmp_path, RUB_Nm)
+    assert best.signal.endswith(FRICTION)
+    assert best.held_out > 60.0
+    where = best.nodes[int(np.argmax(best.values))]
+    assert abs(where - RUB_AT_rad) < RUB_WIDTH_rad
+
+
+def test_an_axis_without_it_shows_no_shape(tmp_path):
+    assert best_shape(tmp_path, 0.0).held_out < 20.0
