@@ -84,7 +84,7 @@ def smooth(estimator: Estimator, h: Hypothesis, x: NDArray) -> None:
         residual = e.measured - e.readings(run, machine, t.windows)[0]
         if np.all(np.isfinite(residual)) and np.max(np.abs(residual)) < 1e12:
             with suppress(np.linalg.LinAlgError):  # the motion before stays
-                t = resmoothed(about(t, machine[0]), run[0], residual)
+                t = resmoothed(about(t, machine[0], h), run[0], residual)
         found.append(t)
     estimator.tracks = found
 
@@ -97,7 +97,7 @@ def with_noise(
     if not all(np.all(np.isfinite(r)) for r in residuals):
         return estimator
     own = estimator.problem.trial_machine
-    tracks = [about(t, own(t.experiment, h, x)) for t in estimator.tracks]
+    tracks = [about(t, own(t.experiment, h, x), h) for t in estimator.tracks]
     return estimator.having(estimated_noise(tracks, residuals, steps=steps))
 
 

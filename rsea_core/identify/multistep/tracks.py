@@ -10,7 +10,7 @@ import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.effects.variant import TrialMachine
 from rsea_core.identify.fitting.predictions import Windows
-from rsea_core.identify.fitting.problem import machine_of
+from rsea_core.identify.fitting.problem import Hypothesis, machine_of
 from rsea_core.identify.multistep.error_filter import (
     LinearErrors,
     Noise,
@@ -19,6 +19,7 @@ from rsea_core.identify.multistep.error_filter import (
 )
 from rsea_core.identify.multistep.experiment import Experiment
 from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, innovations, smoothed
+from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 
 FIRST_SLOW = 1e-3  # of the rated torque: a slow torque before its size is known
 FIRST_COMMAND = 0.01  # of its change over a row
@@ -120,8 +121,13 @@ def prepared(track: Track, **changes) -> Track:
     )  # fmt: skip
 
 
-def about(t: Track, machine: TrialMachine) -> Track:
-    """The track whose errors are linear about another machine."""
+def about(t: Track, machine: TrialMachine, h: Hypothesis) -> Track:
+    """The track whose errors are those of the machine fitted.
+
+    A gear's mesh stays the one that begins: made as soft as backlash would, it hides backlash.
+    """
+    if any(law.effect == MESH_DAMPER for law in h.laws):
+        return t
     return prepared(t, plant=machine.machine_numbers, stiffness=machine.stiffness)
 
 
