@@ -14,7 +14,7 @@ import numpy as np
 
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
-from rsea_core.identify.law_search.hold_out import with_shared_recordings
+from rsea_core.identify.law_search.hold_out import with_pause_shown, with_shared_recordings
 from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
@@ -52,6 +52,9 @@ def investigate(
         if not quick:
             found = confirmed_by_whole_runs(found, nearly, say)
     found.shared = shared
+    best = found.best
+    _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
+    found.best = replace(best, x=x)
     return found
 
 

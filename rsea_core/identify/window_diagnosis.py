@@ -23,6 +23,7 @@ from rsea_core.recordings.quality_checks import data_warnings
 
 OF_THE_LOG = (CLOCK, FILTER, RATIO)
 OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is worth a word
+NEGLIGIBLE_OFFSET = 1e-4  # of the largest command: a smaller one is worth none
 CLOCK_SHOWN = 5.0
 
 
@@ -199,7 +200,10 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
         if law.nuisance and count == 1:
             ((_, value),) = values.items()
             size = std[at] * law.unknowns[0].scale
-            text = _nuisance_text(law, value, size)
+            negligible = law.kind is DriveOffset and abs(value) < NEGLIGIBLE_OFFSET * _span(
+                conclusion
+            )
+            text = "" if negligible else _nuisance_text(law, value, size)
             if text and abs(value) > (CLOCK_SHOWN if law.effect == CLOCK else OFFSET_SHOWN) * size:
                 found.append(Finding(kind=Kind.METHOD, text=text))
         at += count
@@ -248,6 +252,12 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
     return found
+
+
+def _span(conclusion: WindowVerdict) -> float:
+    """Largest command of all recordings, in its unit."""
+    recordings = [r for r in conclusion.case.recordings if r.command_name is not None]
+    return max((float(np.max(np.abs(r[r.command_name]))) for r in recordings), default=0.0)
 
 
 def _nuisance_text(law, value: float, std: float) -> str:

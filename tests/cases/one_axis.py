@@ -59,6 +59,7 @@ def axis_rig(units: Units = Units(), *, off: float = 1.0) -> Rig:
 def axis_recording(
     *terms, seed: int, units: Units = Units(), offset_A: float = 0.0, delay_rows: float = 0.0,
     linear: bool = False, role: str = "identification", uneven: float = 0.0,
+    rig: Rig | None = None,
 ) -> Recording:  # fmt: skip
     """Twelve seconds of an axis (in the unit of time) that is driven to and fro, read by counts.
 
@@ -66,6 +67,8 @@ def axis_recording(
     ----------
     uneven : float
         Standard deviation, in rows, of the times of readings about those of the commands.
+    rig : Rig or None
+        Of the machine; None: `axis_rig`.
     """
     rng = np.random.default_rng(seed)
     n = 1200
@@ -89,7 +92,7 @@ def axis_recording(
         fine = ROW_s * units.time * np.arange((n - 1) * finer + 1) / finer
         held = np.append(np.repeat(current[:-1], finer), current[-1])
         inputs = Inputs(time_s=fine, current_command_A=held, load=Load(kind="free"))
-    model = ActuatorModel(axis_rig(units), tuple(own))
+    model = ActuatorModel(rig or axis_rig(units), tuple(own))
     angle = Replay.of(inputs, step_s=2e-3 * units.time).run(model)[:, 0]
     if uneven:
         late = np.clip(uneven * rng.standard_normal(n), -0.4, 0.4)

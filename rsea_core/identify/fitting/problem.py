@@ -312,10 +312,13 @@ def require_replays(problem: Problem, msni: NDArray) -> None:
 
 
 def _heating(bench: Bench) -> NDArray:
-    """Blocks of time [s] and mean squared currents [A^2], measured or of the nominal machine."""
+    """Blocks of time [s] and mean squared currents [A^2]: read, commanded, or of the rig."""
     r = bench.recording
     if "current_A" in r:
         current = r["current_A"]
+    elif r.command_name == "current_command_A":
+        limit = machine_of(bench.base).current_limit
+        current = np.clip(r[r.command_name], -limit, limit)
     elif r.command_name in ("duty", "voltage_V"):
         current = bench.replay.run_many([bench.base], failures="nan")[0, :, READ_CURRENT]
         current = np.nan_to_num(current)

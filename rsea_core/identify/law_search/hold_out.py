@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.load_base import HELD
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import even_ratio
@@ -26,6 +27,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
 SHARED, LAST = 2.0 / 3.0, 0.25  # of a recording's rows
+PAUSES_s = (1.0, 30.0, 300.0, 3000.0)  # between recordings: hot, warm, cold windings; a cold case
 
 
 def part_of(r: Recording, first: int, last: int, **changes) -> Recording:
@@ -111,6 +113,35 @@ def held_out(found: Found) -> HeldOut | None:
         ]
         gain, ratio = own.tempering * (powers[0] - powers[1]), 0.0
     return HeldOut(gain=gain, ratio=ratio) if np.isfinite(gain) else None
+
+
+def with_pause_shown(
+    found: Found, trial: tuple[Hypothesis, NDArray], horizon: float | None
+) -> tuple[Hypothesis, NDArray]:
+    """A trial whose motor rested before recordings held out for as long as these show.
+
+    Where one recording is fitted no row of it depends on the pause after it: the heat that is left
+    at the next start is as unknown as any other start.
+    """
+    h, _ = trial
+    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    if not unseen or len(found.problem.fitted) > 1 or DriveThermal.effect not in h.effects:
+        return trial
+    tried = [trial, *((h, _rested(found, trial, pause_s)) for pause_s in PAUSES_s)]
+    costs = [_power(of_recordings(found, unseen, t, horizon).innovations([t])) for t in tried]
+    return tried[int(np.argmin(np.where(np.isfinite(costs), costs, np.inf)))]
+
+
+def _rested(found: Found, trial: tuple[Hypothesis, NDArray], pause_s: float) -> NDArray:
+    h, x = trial
+    _, values = found.problem.values(h, x)
+    starts = [
+        [pause_s if u.name == "pause_s" else v[u.name] for u in law.unknowns]
+        for law, v in zip(h.laws, values, strict=True)
+    ]
+    moved = found.problem.start(h, starts)
+    count = len(found.problem.nominals)
+    return np.concatenate([x[:count], moved[count:]])
 
 
 def free_run(found: Found, e: Experiment, trial: tuple[Hypothesis, NDArray]) -> NDArray:

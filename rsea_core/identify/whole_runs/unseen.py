@@ -16,7 +16,7 @@ from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import count_values, even_ratio
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.law_search.hold_out import of_recordings
+from rsea_core.identify.law_search.hold_out import of_recordings, with_pause_shown
 from rsea_core.identify.multistep.criteria import (
     FITTED_ROWS,
     KEPT_RATIO,
@@ -52,7 +52,8 @@ def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, s
     once = all(law.effect == LoadDisturbance.effect for law in added)
     like = replace(found, estimator=own, horizon=None)
     costs = []
-    for trial in ((fit.hypothesis, fit.x), (plain.hypothesis, plain.x)):
+    rested = with_pause_shown(like, (fit.hypothesis, fit.x), None)
+    for trial in (rested, (plain.hypothesis, plain.x)):
         costs.append(_cost(of_recordings(like, unseen, trial, None), *trial))
     return share if costs[0] < (NEGLIGIBLE_INCREASE if once else 1.0) * costs[1] else np.inf
 

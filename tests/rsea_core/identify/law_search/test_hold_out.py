@@ -3,10 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from rsea_core.identify.law_search.hold_out import part_of, with_shared_recordings
+from rsea_core.effects.drive_thermal import DriveThermal
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.hold_out import (
+    part_of,
+    with_pause_shown,
+    with_shared_recordings,
+)
+from rsea_core.identify.law_search.search import laws_of
 from rsea_core.machine.inputs import Load
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+from tests.cases.whole_runs import searched_axis
 
 
 def locked(seed: int):
@@ -50,3 +59,28 @@ def test_the_only_recording_with_a_contact_is_shared(tmp_path):
     assert [r.role for r in shared.recordings] == ["identification"] * 2 + ["validation"]
     both = replace(case, recordings=(*case.recordings, replace(meets, role="identification")))
     assert with_shared_recordings(both)[1] == {}
+
+
+@pytest.mark.parametrize("fitted", [1, 2])
+def test_a_recording_held_out_shows_how_long_the_motor_rested_before_it(tmp_path, fitted):
+    """Each recording was made cold; of several fitted ones the pause is fitted too, and stays."""
+    warm = DriveThermal(
+        winding_heat_capacity_J_per_K=0.1, winding_to_case_W_per_K=5e-3,
+        case_heat_capacity_J_per_K=500.0, resistance_rise_per_K=3.93e-3,
+        torque_constant_fall_per_winding_K=1.1e-3,
+    )  # fmt: skip
+    rig = replace(axis_rig(), terminal_resistance_ohm=1.0)
+    recordings = [axis_recording(warm, seed=j, rig=rig) for j in range(fitted)]
+    held_out = axis_recording(warm, seed=9, role="validation", rig=rig)
+    found, own, plain = searched_axis(tmp_path, *recordings, held_out)
+    law = next(w for w in laws_of(found) if w.key == "drive-thermal/winding, case and magnets")
+    h = Hypothesis(laws=(*plain.hypothesis.laws, law))
+    values = {"winding_heat_capacity_J_per_K": 0.1, "winding_time_s": 20.0, "pause_s": 1.0,
+              "case_heat_capacity_J_per_K": 500.0,
+              "torque_constant_fall_per_winding_K": 1.1e-3}  # fmt: skip
+    begun = own.problem.start(Hypothesis(laws=(law,)), [[values[u.name] for u in law.unknowns]])
+    count = len(own.problem.nominals)  # the rig file is right
+    x = np.concatenate([begun[:count], plain.x[count:], begun[count:]])
+    _, shown = with_pause_shown(found, (h, x), None)
+    pause_s = own.problem.values(h, shown)[1][-1]["pause_s"]
+    assert pause_s >= 300.0 if fitted == 1 else pause_s == pytest.approx(1.0)

@@ -12,11 +12,11 @@ from rsea_core.recordings.recording import Recording
 from tests.cases.one_axis import COUNTS, axis_case, axis_rig
 
 ROW_s, ROWS, PARTS = 0.01, 2000, 10
-RUB_Nm, RUB_AT_rad, RUB_WIDTH_rad = 0.06, 0.4, 0.2
+FRICTION_Nm, FRICTION_AT_rad, FRICTION_WIDTH_rad = 0.06, 0.4, 0.2
 
 
-def rubbed_axis(rub_Nm: float) -> Recording:
-    """An axis that rubs in one range of its angle, in steps of 1 ms, and swings over it."""
+def axis_with_local_friction(friction_Nm: float) -> Recording:
+    """An axis with friction in one range of its angle, in steps of 1 ms."""
     rig = axis_rig()
     inertia = rig.motor_inertia_kgm2 + rig.load_inertia_kgm2
     tau = ROW_s * np.arange(ROWS)
@@ -27,8 +27,12 @@ def rubbed_axis(rub_Nm: float) -> Recording:
         angle[row] = theta
         current[row] = 1.5 * (goal[row] - theta) - 0.15 * omega
         for _ in range(PARTS):
-            rub = rub_Nm * (abs(theta - RUB_AT_rad) < RUB_WIDTH_rad) * np.tanh(omega / 0.01)
-            torque = rig.torque_constant_Nm_per_A * current[row] - rub
+            friction = (
+                friction_Nm
+                * (abs(theta - FRICTION_AT_rad) < FRICTION_WIDTH_rad)
+                * np.tanh(omega / 0.01)
+            )
+            torque = rig.torque_constant_Nm_per_A * current[row] - friction
             torque -= rig.load_viscous_Nms_per_rad * omega
             omega += torque / inertia * ROW_s / PARTS
             theta += omega * ROW_s / PARTS
@@ -38,23 +42,23 @@ def rubbed_axis(rub_Nm: float) -> Recording:
         "motor_angle_rad": np.floor(angle / count) * count,
     }  # fmt: skip
     return Recording(
-        file="rub.csv", load=Load(kind="free"), columns=columns, sample_time_s=ROW_s,
+        file="local.csv", load=Load(kind="free"), columns=columns, sample_time_s=ROW_s,
         initial_rest=True,
     )  # fmt: skip
 
 
-def best_shape(folder, rub_Nm: float):
-    case = axis_case(folder, rubbed_axis(rub_Nm), rig=axis_rig())
+def best_shape(folder, friction_Nm: float):
+    case = axis_case(folder, axis_with_local_friction(friction_Nm), rig=axis_rig())
     estimator, base, _ = parameters(MultistepProblem(case), Hypothesis(), lambda text: None)
     return shapes(Projection(estimator, base))[0]
 
 
 def test_friction_in_a_narrow_range_of_the_angle_is_a_shape_against_the_motion(tmp_path):
-    best = best_shape(tmp_path, RUB_Nm)
+    best = best_shape(tmp_path, FRICTION_Nm)
     assert best.signal.endswith(FRICTION)
     assert best.held_out > 60.0
     where = best.nodes[int(np.argmax(best.values))]
-    assert abs(where - RUB_AT_rad) < RUB_WIDTH_rad
+    assert abs(where - FRICTION_AT_rad) < FRICTION_WIDTH_rad
 
 
 def test_an_axis_without_it_shows_no_shape(tmp_path):
