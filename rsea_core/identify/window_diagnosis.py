@@ -200,10 +200,7 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
         if law.nuisance and count == 1:
             ((_, value),) = values.items()
             size = std[at] * law.unknowns[0].scale
-            negligible = law.kind is DriveOffset and abs(value) < NEGLIGIBLE_OFFSET * _span(
-                conclusion
-            )
-            text = "" if negligible else _nuisance_text(law, value, size)
+            text = _nuisance_text(law, value, size, _span(conclusion))
             if text and abs(value) > (CLOCK_SHOWN if law.effect == CLOCK else OFFSET_SHOWN) * size:
                 found.append(Finding(kind=Kind.METHOD, text=text))
         at += count
@@ -260,8 +257,14 @@ def _span(conclusion: WindowVerdict) -> float:
     return max((float(np.max(np.abs(r[r.command_name]))) for r in recordings), default=0.0)
 
 
-def _nuisance_text(law, value: float, std: float) -> str:
+def _nuisance_text(law, value: float, std: float, span: float) -> str:
+    """What a nuisance's value says; nothing of a negligible one.
+
+    span : largest command
+    """
     if law.kind is DriveOffset:
+        if abs(value) < NEGLIGIBLE_OFFSET * span:
+            return ""
         return f"the drive adds {value:.3g} +- {std:.1g} to every command (amplifier offset)"
     if law.kind is DriveDelay:
         return f"the command acts {value * 1e3:.3g} +- {std * 1e3:.1g} ms late"

@@ -84,6 +84,7 @@ COMPLETE = 1.6  # misfit of whole recordings in noise deviations that is as good
 SOUND, INCOMPLETE = 2.0, 2.0  # misfit of parameters alone: nothing lacks; laws are looked for
 COMPLETE_SHARE = 0.08  # or of what parameters alone leave: small things that every machine has
 DOUBT = 0.1  # of what is left above the noise, in units: by so much rivals are not told apart
+OF_COLOUR = 1.4  # times less error of a reading, by which a law shows that its noise was no noise
 LEAST_OF_LEFT = 0.05  # of what laws gained on whole recordings so far: least gain of a further one
 WHOLE_LAWS, WHOLE_TRIED, WHOLE_FORMS = 3, 24, 3  # laws at most, fitted each time, of one effect
 LEFT_OF_EACH = 0.9  # of the misfit: a law that leaves more of it is none that completes a model

@@ -15,6 +15,7 @@ from rsea_core.identify.multistep.criteria import (
     INCOMPLETE,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
+    OF_COLOUR,
     PER_VALUE,
     RICHER_GAIN,
     SOUND,
@@ -36,6 +37,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     in_sensor_noise,
     is_coloured,
     misfit,
+    most_reduced,
     well_fitted,
 )
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
@@ -61,6 +63,8 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     found = replace(found, left_by_parameters=left)
     if left <= INCOMPLETE and is_coloured(found.base_estimator):
         own, plain, left = _in_less_noise(found, own, plain, say)
+        if left > INCOMPLETE:
+            found = replace(found, left_by_parameters=left)
     if not INCOMPLETE < left < np.inf:
         return found, None
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
@@ -101,16 +105,18 @@ def _in_less_noise(
     """Whole recordings in the noise that the best law leaves, parameters alone, and their misfit.
 
     Coloured noise estimated with parameters alone may be the error of a missing law, as of a late
-    reading.
+    reading: if the law leaves clearly less of a reading (`OF_COLOUR`), parameters are incomplete.
     """
     search = WholeSearch(own, plain, found, laws_of(found), COMPLETE)
     trials = search.trials()
     if not trials:
         return own, plain, found.left_by_parameters
-    own = in_noise_left_by(own, trials[0].fit)
+    best = trials[0]
+    ratio = most_reduced(own, plain, best.fit)
+    own = in_noise_left_by(own, best.fit)
     plain, left = _parameters_alone(own, plain)
-    say(f"  whole recordings: in the noise left by {trials[0].law.key} parameters leave {left:.2f}")
-    return own, plain, left
+    say(f"  whole recordings: in the noise left by {best.law.key} parameters leave {left:.2f}")
+    return own, plain, max(left, ratio * INCOMPLETE / OF_COLOUR) if ratio > OF_COLOUR else left
 
 
 def _other_timing(search: WholeSearch) -> CommandTiming | None:

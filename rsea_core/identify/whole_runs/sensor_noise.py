@@ -87,6 +87,16 @@ def in_noise_left_by(own: Estimator, fit: Estimate) -> Estimator:
     return own.having(tracks)
 
 
+def most_reduced(own: Estimator, before: Estimate, after: Estimate) -> float:
+    """Root mean square error of a reading by one fit over that by another, where it is largest."""
+    ratios = [1.0]
+    pairs = (own.innovations([(f.hypothesis, f.x)]) for f in (before, after))
+    for e, f in zip(*pairs, strict=True):
+        had, left = (np.mean(huber_squares(i[0]), axis=0) for i in (e, f))
+        ratios.append(float(np.sqrt(np.max(had / np.maximum(left, 1e-12)))))
+    return max(ratios)
+
+
 def _delay_s(estimator: Estimator, fit: Estimate) -> float:
     """How late commands act, by a fit."""
     _, values = estimator.problem.values(fit.hypothesis, fit.x)
