@@ -120,6 +120,9 @@ def cooled(initial_rises_K, capacity: float, across: float, case: float, times) 
 
 
 MAGNETS_per_K = 1.1e-3  # NdFeB
+MAGNETS_SPREAD = (
+    0.45  # of a temperature that only their weakening shows: 0.0005 to 0.002 per kelvin
+)
 START_TIMES = (0.1, 0.4, 1.5)  # of the longest recording
 START_RISE_K = 10.0
 CASE_PER_WINDING = 60.0  # heat capacities, where nothing is known of the case
@@ -354,7 +357,7 @@ class DriveThermal(Term):
             starts=tuple((*values, weaker) for values in starts), **common,
         )  # fmt: skip
         if not electric:
-            return (with_magnets,)
+            return (replace(with_magnets, own_form_spread=MAGNETS_SPREAD),)
         return (
             Law(law="winding and case", unknowns=unknowns, starts=starts,
                 richer=("winding, case and magnets",), **common),

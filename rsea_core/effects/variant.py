@@ -208,6 +208,12 @@ class Law:
     figure_values: Mapping[str, str] = field(default_factory=dict)
     only: str | None = None  # file of the one recording that it acts on
     nuisance: bool = False  # part of every hypothesis, of the experiment and not of the machine
+    own_form_spread: float | None = None  # in place of its class's, where it assumes more
+
+    @property
+    def form_spread(self) -> float:
+        """Relative error of its figures by what it assumes."""
+        return self.kind.form_spread if self.own_form_spread is None else self.own_form_spread
 
     @property
     def key(self) -> str:

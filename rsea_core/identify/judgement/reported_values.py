@@ -57,7 +57,7 @@ def figures_with_std(
         alike = [(v[name], gap) for v, gap in others if name in v]
         variance += between_laws(value, alike, TEMPERATURE)
         size = value - 1.0 if name in AT_ONE else value
-        variance += (LAW_SPREAD * size) ** 2 + (law.kind.form_spread * size) ** 2
+        variance += (LAW_SPREAD * size) ** 2 + (law.form_spread * size) ** 2
         found[name] = {
             "value": float(value),
             "std": float(np.sqrt(variance)),

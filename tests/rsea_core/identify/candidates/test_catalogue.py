@@ -2,7 +2,10 @@
 
 from dataclasses import replace
 
-from rsea_core.effects.registry import LoadDrag
+import numpy as np
+import pytest
+
+from rsea_core.effects.registry import DriveThermal, LoadDrag
 from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
@@ -54,3 +57,11 @@ def test_a_drag_on_a_bare_shaft_acts_in_the_model():
         for terms in ((), (drag,))
     )
     assert (plain != with_drag).any()
+
+
+def test_a_temperature_that_weaker_magnets_alone_show_is_as_uncertain_as_these(tmp_path):
+    """A regulated current hides the resistance; magnets lose 0.05 to 0.2 % per kelvin."""
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    law = catalogue(case, relative=True)["drive-thermal/winding, case and magnets"]
+    assert law.form_spread == pytest.approx(np.log(0.2 / 0.05) / np.sqrt(12.0), abs=0.01)
+    assert DriveThermal.form_spread < 0.1 < law.form_spread
