@@ -120,9 +120,8 @@ def cooled(initial_rises_K, capacity: float, across: float, case: float, times) 
 
 
 MAGNETS_per_K = 1.1e-3  # NdFeB
-MAGNETS_SPREAD = (
-    0.45  # of a temperature that only their weakening shows: 0.0005 to 0.002 per kelvin
-)
+# of a temperature that their weakening alone shows: 0.0005 to 0.002 per kelvin, of any material
+MAGNETS_SPREAD = 0.4
 START_TIMES = (0.1, 0.4, 1.5)  # of the longest recording
 START_RISE_K = 10.0
 CASE_PER_WINDING = 60.0  # heat capacities, where nothing is known of the case
