@@ -342,7 +342,7 @@ def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[T
 
 
 def worth(trial: Trial) -> float:
-    """What a law gains over its rivals: errors that depend on each other feign some for a value."""
+    """Gain of a law less a price: dependent errors give every further value some gain."""
     return trial.gain - RICHER_GAIN * count_values(trial.law)
 
 
