@@ -328,6 +328,8 @@ def main() -> int:
     parser.add_argument("--against", choices=("ccx",), default="ccx")
     parser.add_argument("--again", action="store_true", help="solve filed designs once more")
     arguments = parser.parse_args()
+    if arguments.count < 1 or min(arguments.only or [0]) < 0:
+        parser.error("--count: 1 or more; --only: 0 or more")
     if shutil.which("ccx") is None:
         print("ccx is missing: apt-get install calculix-ccx (Debian)", file=sys.stderr)
         return 2

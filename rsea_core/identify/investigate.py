@@ -54,13 +54,13 @@ def investigate(
     found.shared = shared
     best = found.best
     _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
-    found.best = replace(best, x=x)
+    found.best, found.pause_shown = replace(best, x=x), x is not best.x
     return found
 
 
 def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:
     """The best of further searches, where the end of the first is in doubt."""
-    left = found.left_by_parameters
+    left, below = found.left_by_parameters, found.sound_below
     if found.steps and not quick:
         found = _better_search(found, _begun_by_contender(found, say))
         # a missing law can pass for another timing of the command
@@ -72,7 +72,7 @@ def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:
             found = _better_search(found, _begun_by_contender(again, say), again)
     if not quick and encoders_disagree(found):
         found = _better_search(found, _through_gear_mesh(case, found, say))
-    return replace(found, left_by_parameters=left)
+    return replace(found, left_by_parameters=left, sound_below=below)
 
 
 def _through_gear_mesh(case: Case, found: Found, say) -> Found:

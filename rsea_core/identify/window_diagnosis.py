@@ -22,8 +22,8 @@ from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
 
 OF_THE_LOG = (CLOCK, FILTER, RATIO)
-OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is worth a word
-NEGLIGIBLE_OFFSET = 1e-4  # of the largest command: a smaller one is worth none
+OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is stated
+NEGLIGIBLE_OFFSET = 1e-4  # of the largest command: a smaller one is not stated
 CLOCK_SHOWN = 5.0
 
 
@@ -159,6 +159,7 @@ def unexplained_part_of(conclusion: WindowVerdict) -> dict | None:
         | {
             "words": shape.sentence() + _by_formula(conclusion),
             "depends_on": shape.signal,
+            "opposes_motion": shape.friction,
             "nodes": [float(v) for v in shape.nodes],
             f"values_{unit}": [float(v) for v in shape.values],
         }
@@ -232,11 +233,7 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
                 f" value ({p.value:.4g} -> {conclusion.nominal[p.key]:.4g}): is the file right?"
             )
             found.append(Finding(kind=Kind.METHOD, text=text))
-    for file, why in conclusion.found.shared.items():
-        text = (
-            f"{file}: its first two thirds were fitted, for {why}; the last third stayed held out"
-        )
-        found.append(Finding(kind=Kind.METHOD, text=text))
+    found += [Finding(kind=Kind.METHOD, text=text) for text in _fitted_of_held_out(conclusion)]
     if conclusion.unknown_torque is not None:
         text = f"the model leaves {conclusion.unknown_torque}: smaller effects cannot be detected"
         found.append(Finding(kind=Kind.METHOD, text=text))
@@ -248,6 +245,21 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
             " leaves the recordings, and laws were judged in windows of that length"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
+    return found
+
+
+def _fitted_of_held_out(conclusion: WindowVerdict) -> list[str]:
+    """What was taken from recordings held out, a sentence each."""
+    found = [
+        f"{file}: its first two thirds were fitted, for {why}; the last third stayed held out"
+        for file, why in conclusion.found.shared.items()
+    ]
+    if conclusion.found.pause_shown:
+        pause_s = next(v["pause_s"] for v in conclusion.laws if "pause_s" in v)
+        found.append(
+            f"the motor rested about {pause_s:.0f} s before the recordings held out: they alone"
+            " show it, and nothing else was fitted to them"
+        )
     return found
 
 

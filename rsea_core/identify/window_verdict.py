@@ -17,7 +17,7 @@ from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.hold_out import HeldOut, free_run, held_out
 from rsea_core.identify.law_search.longer_windows import error_left_beyond
-from rsea_core.identify.law_search.shape_search import FRICTION, Shape
+from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     DEPENDENT,
     DOUBTED_ERROR,
@@ -385,6 +385,5 @@ def _convincing(shapes: Sequence[Shape]) -> Shape | None:
     best = next(iter(shapes), None)
     if best is None or best.held_out < SHAPE_GAIN:
         return None
-    uneven = best.signal.endswith(FRICTION) and best.held_out > UNEVEN_GAIN
-    ratio = LEAST_RATIO if uneven else SHAPE_RATIO
+    ratio = LEAST_RATIO if best.friction and best.held_out > UNEVEN_GAIN else SHAPE_RATIO
     return best if best.held_out > ratio * best.deviation else None

@@ -80,7 +80,7 @@ def run_machines(
         out = replay.run_cover(numbers, windows.rows, starts, failures="nan")
     out[lost] = np.nan
     for run, d in zip(out, machines, strict=True):
-        turn_back(run, d, where)
+        restore_angles(run, d, where)
     return out
 
 
@@ -146,21 +146,21 @@ def _without_start(starts: NDArray) -> NDArray:
 def shift_starts(y: NDArray, d: TrialMachine, where: RunConditions) -> None:
     """Bring start states (..., N_STEP_STATES) from what sensors misread to what is true.
 
-    An imposed load moves as its sensor reads. Where that has an offset the machine runs in angles
-    that are turned by it, and its run is turned back (`turn_back`).
+    An imposed load moves as its sensor reads. If the sensor has an offset, the machine is simulated
+    in angles that are shifted by it, and `restore_angles` shifts its run back.
     """
     if d.start_load_scale != 1.0:
         y[..., list(LOAD_STATES + LOAD_SPEEDS)] *= d.start_load_scale
     if d.start_motor_scale != 1.0:
         y[..., list(WHEEL_STATES + WHEEL_SPEEDS)] *= d.start_motor_scale
     if d.start_load_rad or d.start_motor_rad:
-        turned = d.start_load_rad if where.kind == "imposed" else 0.0
-        y[..., list(LOAD_STATES)] += d.start_load_rad - turned
-        y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio - turned
+        shift = d.start_load_rad if where.kind == "imposed" else 0.0
+        y[..., list(LOAD_STATES)] += d.start_load_rad - shift
+        y[..., list(WHEEL_STATES)] += d.start_motor_rad / where.ratio - shift
 
 
-def turn_back(run: NDArray, d: TrialMachine, where: RunConditions) -> None:
-    """Bring the angles of a run (n, 7) from those in which an imposed load moves to the true."""
+def restore_angles(run: NDArray, d: TrialMachine, where: RunConditions) -> None:
+    """Shift the angles of a run (n, 7) from those read of an imposed load to the true ones."""
     if where.kind == "imposed" and d.start_load_rad:
         run[:, CHANNELS.index("motor_angle_rad")] += where.ratio * d.start_load_rad
         run[:, CHANNELS.index("load_angle_rad")] += d.start_load_rad

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from rsea_core.effects.variant import TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
-from rsea_core.identify.fitting.predictions import shift_starts, turn_back, undeflect_link
+from rsea_core.identify.fitting.predictions import restore_angles, shift_starts, undeflect_link
 from rsea_core.identify.fitting.problem import Bench, Problem
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 
@@ -114,7 +114,7 @@ def predict_many(
     for w, run in enumerate(runs):
         first, last = windows[w]
         for i, d in enumerate(machines):
-            turn_back(run[i], d, bench.where)
+            restore_angles(run[i], d, bench.where)
             found[i].append(_readings(run[i], d, bench, slice(first, last + 1)))
     return found
 

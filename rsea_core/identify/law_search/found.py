@@ -67,9 +67,13 @@ class Found:
         A law taken and taken out again, for it gained in too few stretches of rows.
     shared : dict of str
         Recordings held out of which a part was fitted, and why (`hold_out.with_shared_recordings`).
+    pause_shown : bool
+        Whether recordings held out told how long the motor rested before them.
     left_by_parameters : float
         What parameters alone leave of whole recordings, in deviations of the sensors' noise
         (`whole_runs`); inf: not known.
+    sound_below : float
+        Of these deviations, the number below which parameters are all that there is.
     complete : bool
         Whether laws stand by whole recordings: they leave nothing but that noise, or little more.
     explained : float
@@ -85,19 +89,21 @@ class Found:
     horizon: float | None
     base_horizon: float | None = None
     shared: dict[str, str] = field(default_factory=dict)
+    pause_shown: bool = False
     steps: list[Step] = field(default_factory=list)
     refused: Step | None = None
     base_shapes: list[Shape] = field(default_factory=list)
     shapes: list[Shape] = field(default_factory=list)
     screened: list[Candidate] = field(default_factory=list)
     left_by_parameters: float = np.inf
+    sound_below: float = SOUND
     complete: bool = False
     explained: float = 1.0
 
     @property
     def sound(self) -> bool:
         """Whether parameters alone predict whole recordings to the sensors' noise."""
-        return self.left_by_parameters < SOUND
+        return self.left_by_parameters < self.sound_below
 
     @property
     def acts_once(self) -> bool:

@@ -27,7 +27,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
 SHARED, LAST = 2.0 / 3.0, 0.25  # of a recording's rows
-PAUSES_s = (1.0, 30.0, 300.0, 3000.0)  # between recordings: hot, warm, cold windings; a cold case
+PAUSES_s = (1.0, 30.0, 300.0, 3000.0)  # that are tried between two recordings
 
 
 def part_of(r: Recording, first: int, last: int, **changes) -> Recording:
@@ -118,10 +118,10 @@ def held_out(found: Found) -> HeldOut | None:
 def with_pause_shown(
     found: Found, trial: tuple[Hypothesis, NDArray], horizon: float | None
 ) -> tuple[Hypothesis, NDArray]:
-    """A trial whose motor rested before recordings held out for as long as these show.
+    """A trial with the pause before recordings held out that predicts these best.
 
-    Where one recording is fitted no row of it depends on the pause after it: the heat that is left
-    at the next start is as unknown as any other start.
+    If one recording is fitted, none of its rows depends on the pause after it: the temperature at
+    the next start is an unknown initial state, estimated as the other ones are.
     """
     h, _ = trial
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]

@@ -159,6 +159,8 @@ def add_all(
         pruned(found, say)
     without_weak_end(found)
     found.base_shapes = found.shapes = shapes(Projection(found.base_estimator, found.base))
+    for shape in found.base_shapes[:2]:
+        say(f"  {shape.sentence()}: held-out gain {shape.held_out:.1f} +- {shape.deviation:.1f}")
     if found.steps:
         found.shapes = shapes(Projection(found.estimator, found.best))
 

@@ -21,7 +21,7 @@ from rsea_core.identify.multistep.tracks import Track
 from rsea_core.identify.smoothing.error_model import one_body
 
 HATS, FRICTION_HATS = 7, 15
-FRICTION = ", against the motion"  # after an angle: a torque that changes its sign with the speed
+SPEED_OF = {"wheel angle": k.WW, "load angle": k.WL}  # which friction over that angle opposes
 PORTS = {"G": "gear", "L": "load", "S": "spring", "V": "drive"}
 
 
@@ -32,6 +32,8 @@ class Shape:
     Attributes
     ----------
     port, signal : str
+    friction : bool
+        Whether the torque opposes the motion: the function is then its size.
     nodes, values : (h,) arrays
         The function, in Nm at the output or in V.
     held_out, deviation, gain : float
@@ -45,6 +47,7 @@ class Shape:
     gain: float
     held_out: float
     deviation: float
+    friction: bool = False
 
     def sentence(self) -> str:
         """Where it enters, on what it depends, how large it is."""
@@ -53,7 +56,8 @@ class Shape:
         size = float(np.ptp(self.values))
         where = {"G": "at the gear", "L": "on the load", "S": "in the spring",
                  "V": "at the winding"}[self.port]  # fmt: skip
-        return f"a {what} {where} that follows the {self.signal}, {size:.3g} {unit} over its range"
+        what = "friction" if self.friction else f"a {what}"
+        return f"{what} {where} that follows the {self.signal}, {size:.3g} {unit} over its range"
 
     @property
     def subsystem(self) -> str:
@@ -66,11 +70,11 @@ def shapes(projection: Projection) -> list[Shape]:
     tracks = projection.estimator.tracks
     found = []
     for port in ports(tracks[0]):
-        for signal in _signals(tracks[0], port):
+        for signal, friction in _signals(tracks[0], port):
             values = [_signal(t, signal) for t in tracks]
             both = np.concatenate(values)
-            hats = FRICTION_HATS if signal.endswith(FRICTION) else HATS
-            nodes = np.unique(np.quantile(both, np.linspace(0.02, 0.98, hats)))
+            hats = np.linspace(0.02, 0.98, FRICTION_HATS if friction else HATS)
+            nodes = np.unique(np.quantile(both, hats))
             if nodes.size < 4:
                 continue
             columns = []
@@ -82,8 +86,9 @@ def shapes(projection: Projection) -> list[Shape]:
                     scale = (
                         t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
                     )
-                    torque = scale * np.interp(v, nodes, height) * _direction(t, signal)
-                    part.append(response(t, port, torque))
+                    size = scale * np.interp(v, nodes, height)
+                    sign = -np.sign(t.motion[:, SPEED_OF[signal]]) if friction else 1.0
+                    part.append(response(t, port, sign * size))
                 moved = [e + c for e, c in zip(projection.level, part, strict=True)]
                 columns.append(projection.column(moved))
             judged = projection.judged(np.array(columns))
@@ -94,7 +99,7 @@ def shapes(projection: Projection) -> list[Shape]:
             scale = first.voltage_V if port == "V" else first.torque_Nm[int(port == "L")]
             found.append(
                 Shape(port=port, signal=signal, nodes=nodes, values=scale * size, gain=gain,
-                      held_out=held_out, deviation=deviation)
+                      held_out=held_out, deviation=deviation, friction=friction)
             )  # fmt: skip
     return sorted(found, key=lambda s: -s.held_out)
 
@@ -116,26 +121,20 @@ def ports(t: Track) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _signals(t: Track, port: str) -> tuple[str, ...]:
+def _signals(t: Track, port: str) -> list[tuple[str, bool]]:
+    """Signals that a shape may follow, and whether as friction."""
     plant = machine_of(t.experiment.base)
-    body = {"G": ("wheel speed", "wheel angle", "current", "wheel angle" + FRICTION),
-            "L": ("load speed", "load angle", "load angle" + FRICTION),
+    body = {"G": ("wheel speed", "wheel angle", "current"), "L": ("load speed", "load angle"),
             "S": ("deflection", "deflection rate"), "V": ("current",)}[port]  # fmt: skip
     more = ("command",) if t.experiment.recording.command_name and port in "GV" else ()
     if port == "G" and plant.structure == mp.RIGID_FREE:
         more = (*more, "load angle")
-    return (*body, *more)
-
-
-def _direction(t: Track, signal: str) -> NDArray | float:
-    """By which a shape's torque (n,) is multiplied: the direction that friction has, or one."""
-    if not signal.endswith(FRICTION):
-        return 1.0
-    return -np.sign(t.motion[:, k.WW if signal.startswith("wheel") else k.WL])
+    plain = [(signal, False) for signal in (*body, *more)]
+    return plain + [(signal, True) for signal in body if signal in SPEED_OF]
 
 
 def _signal(t: Track, name: str) -> NDArray:
-    m, name = t.motion, name.removesuffix(FRICTION)
+    m = t.motion
     if name == "command":
         r = t.experiment.recording
         return np.asarray(r[r.command_name])

@@ -96,8 +96,8 @@ def with_noise(
     residuals = [r[0] for r in estimator.residuals([(h, x)])]
     if not all(np.all(np.isfinite(r)) for r in residuals):
         return estimator
-    own = estimator.problem.trial_machine
-    tracks = [about(t, own(t.experiment, h, x), h) for t in estimator.tracks]
+    trial = estimator.problem.trial_machine
+    tracks = [about(t, trial(t.experiment, h, x), h) for t in estimator.tracks]
     return estimator.having(estimated_noise(tracks, residuals, steps=steps))
 
 

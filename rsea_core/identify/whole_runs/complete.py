@@ -12,13 +12,12 @@ from rsea_core.identify.multistep.criteria import (
     COMPLETE,
     COMPLETE_SHARE,
     EXPLAINED,
-    INCOMPLETE,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
-    OF_COLOUR,
     PER_VALUE,
     RICHER_GAIN,
     SOUND,
+    SOUND_IN_LEFT_NOISE,
     UNPREDICTED,
     WHOLE_LAWS,
 )
@@ -37,7 +36,6 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     in_sensor_noise,
     is_coloured,
     misfit,
-    most_reduced,
     well_fitted,
 )
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
@@ -61,11 +59,10 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     plain, left = _parameters_alone(own, found.base)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
-    if left <= INCOMPLETE and is_coloured(found.base_estimator):
-        own, plain, left = _in_less_noise(found, own, plain, say)
-        if left > INCOMPLETE:
-            found = replace(found, left_by_parameters=left)
-    if not INCOMPLETE < left < np.inf:
+    if left <= SOUND and is_coloured(found.base_estimator):
+        own, plain, left = _in_noise_of_best_law(found, own, plain, say)
+        found = replace(found, left_by_parameters=left, sound_below=SOUND_IN_LEFT_NOISE)
+    if found.sound or not left < np.inf:
         return found, None
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
     for _ in range(WHOLE_LAWS):
@@ -99,24 +96,22 @@ def _parameters_alone(own: Estimator, fit: Estimate) -> tuple[Estimate, float]:
     return plain, left
 
 
-def _in_less_noise(
+def _in_noise_of_best_law(
     found: Found, own: Estimator, plain: Estimate, say
 ) -> tuple[Estimator, Estimate, float]:
     """Whole recordings in the noise that the best law leaves, parameters alone, and their misfit.
 
     Coloured noise estimated with parameters alone may be the error of a missing law, as of a late
-    reading: if the law leaves clearly less of a reading (`OF_COLOUR`), parameters are incomplete.
+    reading.
     """
     search = WholeSearch(own, plain, found, laws_of(found), COMPLETE)
     trials = search.trials()
     if not trials:
         return own, plain, found.left_by_parameters
-    best = trials[0]
-    ratio = most_reduced(own, plain, best.fit)
-    own = in_noise_left_by(own, best.fit)
+    own = in_noise_left_by(own, trials[0].fit)
     plain, left = _parameters_alone(own, plain)
-    say(f"  whole recordings: in the noise left by {best.law.key} parameters leave {left:.2f}")
-    return own, plain, max(left, ratio * INCOMPLETE / OF_COLOUR) if ratio > OF_COLOUR else left
+    say(f"  whole recordings: in the noise left by {trials[0].law.key} parameters leave {left:.2f}")
+    return own, plain, left
 
 
 def _other_timing(search: WholeSearch) -> CommandTiming | None:
@@ -177,7 +172,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     nearly : Found or None
         What stands instead where windows showed nothing, or what leaves more.
     """
-    if not INCOMPLETE < found.left_by_parameters < np.inf:
+    if found.sound or not found.left_by_parameters < np.inf:
         return found
     own = in_sensor_noise(found.base_estimator, found.base)
     h = found.best.hypothesis

@@ -70,31 +70,20 @@ def is_coloured(estimator: Estimator) -> bool:
 
 
 def in_noise_left_by(own: Estimator, fit: Estimate) -> Estimator:
-    """Another estimator, the noise of each reading no larger than the errors that a fit leaves.
+    """Another estimator, the noise of each reading as large as the errors that a fit leaves.
 
     Noise that was estimated while a law was missing includes the error that this law explains.
     """
     left: dict[str, list[float]] = {}
     for t, e in zip(own.tracks, own.innovations([(fit.hypothesis, fit.x)]), strict=True):
-        for name, mean in zip(
-            t.experiment.channels, np.mean(huber_squares(e[0]), axis=0), strict=True
-        ):
-            left.setdefault(name, []).append(float(np.sqrt(mean)))
+        sizes = np.sqrt(np.mean(huber_squares(e[0]), axis=0))
+        for name, size in zip(t.experiment.channels, sizes, strict=True):
+            left.setdefault(name, []).append(float(size))
     tracks = []
     for t in own.tracks:
-        share = np.array([min(1.0, max(left[name])) for name in t.experiment.channels])
+        share = np.array([max(left[name]) for name in t.experiment.channels])
         tracks.append(prepared(t, noise=replace(t.noise, readings=share * t.noise.readings)))
     return own.having(tracks)
-
-
-def most_reduced(own: Estimator, before: Estimate, after: Estimate) -> float:
-    """Root mean square error of a reading by one fit over that by another, where it is largest."""
-    ratios = [1.0]
-    pairs = (own.innovations([(f.hypothesis, f.x)]) for f in (before, after))
-    for e, f in zip(*pairs, strict=True):
-        had, left = (np.mean(huber_squares(i[0]), axis=0) for i in (e, f))
-        ratios.append(float(np.sqrt(np.max(had / np.maximum(left, 1e-12)))))
-    return max(ratios)
 
 
 def _delay_s(estimator: Estimator, fit: Estimate) -> float:

@@ -4,7 +4,7 @@ import numpy as np
 
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Projection
-from rsea_core.identify.law_search.shape_search import FRICTION, shapes
+from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.machine.inputs import Load
@@ -53,9 +53,10 @@ def best_shape(folder, friction_Nm: float):
     return shapes(Projection(estimator, base))[0]
 
 
-def test_friction_in_a_narrow_range_of_the_angle_is_a_shape_against_the_motion(tmp_path):
+def test_friction_in_a_narrow_range_of_the_angle_is_a_shape_of_friction(tmp_path):
     best = best_shape(tmp_path, FRICTION_Nm)
-    assert best.signal.endswith(FRICTION)
+    assert best.friction
+    assert best.sentence().startswith("friction at the gear that follows the wheel angle")
     assert best.held_out > 60.0
     where = best.nodes[int(np.argmax(best.values))]
     assert abs(where - FRICTION_AT_rad) < FRICTION_WIDTH_rad

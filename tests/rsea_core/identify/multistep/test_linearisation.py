@@ -68,7 +68,7 @@ def recorded(delay_rows: float) -> tuple[Recording, np.ndarray]:
 
 
 def test_a_late_command_is_found_on_a_lightly_damped_machine_whose_file_errs(tmp_path):
-    """Errors about the file's machine were dependent (share 0.09): the delay was not found."""
+    """Errors about the file's machine are dependent, and the delay is not found with them."""
     recording, _ = recorded(delay_rows=3.5)
     case = axis_case(tmp_path, recording, rig=coupled_drives(off=0.93, load=1.07 * LOAD_kgm2))
     problem, h = MultistepProblem(case), Hypothesis(laws=nuisances(case))
@@ -86,7 +86,7 @@ def test_a_late_command_is_found_on_a_lightly_damped_machine_whose_file_errs(tmp
 def test_a_deflection_that_only_speeds_show_is_smoothed_again_and_again_to_itself(tmp_path):
     """No unknown torque is left: each round of smoothing must keep the motion of the round before.
 
-    An absolute angle of large variance moved it by up to 230 times.
+    An absolute angle of large variance leaves the deflection to round-off.
     """
     recording, states = recorded(delay_rows=0.0)
     problem = MultistepProblem(axis_case(tmp_path, recording, rig=coupled_drives()))

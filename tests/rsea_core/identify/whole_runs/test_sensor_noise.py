@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.multistep.kalman_filter import huber_squares
-from rsea_core.identify.whole_runs.sensor_noise import excess, misfit, most_reduced
+from rsea_core.identify.whole_runs.sensor_noise import excess, misfit
 
 
 def machine(*innovations):
@@ -35,13 +35,3 @@ def test_what_noise_alone_leaves_has_no_excess():
     assert excess(machine(0.9 * rows), None, None) == 0.0
     twice = excess(machine(np.full((100, 1), 1.2)), None, None)
     assert twice == pytest.approx(50.0 * (huber_squares(1.2) - 1.0))
-
-
-def test_the_reading_of_which_a_fit_leaves_least_of_another_ones_errors_counts():
-    rows = np.full((100, 2), 0.8)
-    own = SimpleNamespace(innovations=lambda trials: [(rows * trials[0][1])[None]])
-    before, after = (SimpleNamespace(hypothesis=None, x=np.array(x)) for x in ((1, 1), (0.5, 0.9)))
-    expected = np.sqrt(huber_squares(0.8) / huber_squares(0.4))
-    assert most_reduced(own, before, after) == pytest.approx(expected)
-    assert expected == pytest.approx(2.0, rel=0.12)
-    assert most_reduced(own, after, before) == 1.0
