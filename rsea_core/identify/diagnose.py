@@ -17,6 +17,7 @@ from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
 from rsea_core.identify.multistep.criteria import DOUBTED_SHARE, NEEDS_NO_WINDOWS, NO_PREDICTION
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import diagnose_windows
+from rsea_core.numeric.threads import on_one_blas_thread
 from rsea_core.recordings.case import Case
 
 BENCH_ROW_s = 2.5e-3
@@ -45,6 +46,7 @@ def _is_of_bench(r) -> bool:
     return r.command_name == "duty" and sensors and fast and r.initial_rest
 
 
+@on_one_blas_thread
 def diagnose(
     case: Case,
     *,

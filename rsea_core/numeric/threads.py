@@ -3,12 +3,13 @@
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
+from functools import cache, wraps
 from itertools import pairwise
 from types import CodeType
 
 import numba
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 PIECES_PER_THREAD = 4
 _compiled: set[CodeType] = set()  # of every `run` whose first piece has been through
@@ -45,6 +46,21 @@ def share_out_all(
         pool = _pool(most, os.getpid())
         for piece in [pool.submit(*each) for each in pieces]:
             piece.result()
+
+
+def on_one_blas_thread(function: Callable) -> Callable:
+    """A function during which BLAS uses one thread.
+
+    The matrices here have some ten rows: threads of BLAS wait for each other for longer than the
+    product takes, and for the threads of `share_out`.
+    """
+
+    @wraps(function)
+    def limited(*args, **kwargs):
+        with threadpool_limits(1, user_api="blas"):
+            return function(*args, **kwargs)
+
+    return limited
 
 
 @cache
