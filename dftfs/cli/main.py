@@ -81,6 +81,8 @@ def _run(given: list[str]) -> int:
 
 def program() -> int:
     """The command line as a process: done is done, a late Ctrl-C does not disturb the end."""
+    # its threads wait for each other on small matrices; PARDISO and compiled loops have their own
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read once, when numpy is imported
     status = main()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     return status

@@ -11,6 +11,7 @@ import numba
 import numpy as np
 from threadpoolctl import threadpool_limits
 
+OPENBLAS = ("libopenblas", "libscipy_openblas")  # file names, of Linux distributions and wheels
 PIECES_PER_THREAD = 4
 _compiled: set[CodeType] = set()  # of every `run` whose first piece has been through
 
@@ -49,15 +50,15 @@ def share_out_all(
 
 
 def on_one_blas_thread(function: Callable) -> Callable:
-    """A function during which BLAS uses one thread.
+    """A function during which OpenBLAS uses one thread.
 
     The matrices here have some ten rows: threads of BLAS wait for each other for longer than the
-    product takes, and for the threads of `share_out`.
+    product takes, and for the threads of `share_out`. The command line sets this for all it does.
     """
 
     @wraps(function)
     def limited(*args, **kwargs):
-        with threadpool_limits(1, user_api="blas"):
+        with threadpool_limits(dict.fromkeys(OPENBLAS, 1)):
             return function(*args, **kwargs)
 
     return limited
