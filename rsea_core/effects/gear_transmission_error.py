@@ -144,9 +144,7 @@ def _parameters(v: Values, rig: Rig) -> Values:
 
 
 def _with(zero: Unknown, law: Law) -> Law:
-    """A law of the wheel with an offset of the encoders."""
-    if not any(u.name.startswith("wheel") for u in law.unknowns):
-        return law
+    """A law with an offset of the encoders."""
     starts = tuple((*start, 0.0) for start in law.starts)
     return replace(law, unknowns=(*law.unknowns, zero), starts=starts)
 
@@ -161,7 +159,8 @@ class GearTransmissionError(Term):
 
     The spring sees theta_w + e(theta_w) - e(0) + offset, slack where the angles are zero but for
     the offset, and the wheel tau_s (1 + e'), so that no energy is made. The wheel's own inertia
-    behind the error is neglected.
+    behind the error is neglected. Of a rigid train the load's angle is theta_w + e(theta_w) - e(0)
+    + offset; the torques that move it by e are neglected too.
     """
 
     effect: ClassVar[str] = "gear-transmission-error"
@@ -273,10 +272,6 @@ class GearTransmissionError(Term):
             "wheel_error_cycles": self.wheel_cycles_per_rev,
         }
 
-    def needs(self, command_name: str | None, rigid: bool, dry: int) -> str | None:
-        """It deflects the spring."""
-        return "needs a spring, whose deflection it changes" if rigid else None
-
     def equation(self) -> str:
         turns = "" if self.wheel_cycles_per_rev == 1.0 else f"{self.wheel_cycles_per_rev:g} "
         return (
@@ -299,7 +294,8 @@ class GearTransmissionError(Term):
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """One wave of wheel or worm, both, and their harmonics."""
         deflection = typical.deflection_rad
-        most = (1.5 if typical.relative else 0.3) * deflection
+        rigid = typical.relative and not typical.rig.has("spring")  # the error is all of it
+        most = (4.0 if rigid else 1.5 if typical.relative else 0.3) * deflection
         bounds = {"scale": 0.02 * deflection, "low": -most, "high": most}
 
         def pair(part: str, wave: str, prior: float) -> tuple[Unknown, ...]:
@@ -344,7 +340,10 @@ class GearTransmissionError(Term):
         if not typical.relative:
             return found
         zero = Unknown(name=OFFSET, unit="rad", prior=WHEEL_ERROR_rad, **bounds)
-        return tuple(_with(zero, law) for law in (*found, twice, *several))
+        return tuple(
+            _with(zero, law) if rigid or any(u in law.unknowns for u in wheel) else law
+            for law in (*found, twice, *several)
+        )
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:

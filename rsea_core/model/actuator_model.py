@@ -162,7 +162,8 @@ class ActuatorModel:
         found, setter = _numbers_of_servo(self.rig, command_name), {}
         for term, numbers in zip(acting, given, strict=True):
             obstacle = term.needs(command_name, rigid, len(dry))
-            if obstacle is None and rigid and load.is_held and dry & numbers.keys():
+            bound = dry & numbers.keys() or "wheel_error" in numbers
+            if obstacle is None and rigid and load.is_held and bound:
                 obstacle = "needs a spring where the load is held"
             if obstacle is not None:
                 raise TermError(f"{term.effect} on rig {self.rig.name!r}: {obstacle}")

@@ -21,6 +21,7 @@ import rsea_core.engines.event_driven.equations as eq
 import rsea_core.engines.event_driven.events as sw
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
+from rsea_core.effects.gear_transmission_error import angle_error
 from rsea_core.numeric.runge_kutta import MATRIX, NODES, STAGES, WEIGHTS
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
@@ -247,12 +248,12 @@ def _quantised(angle, count):
 def _read(plant, schedule, sensors, row, y, log, signals):
     """What the controller is given at this row; its states are in the log already."""
     signals[k.REFERENCE : k.REFERENCE_ACCELERATION + 1] = schedule.reference[row]
-    motor_angle, load_angle, current = y[k.TW] * plant.gear_ratio, y[k.TL], y[k.IM]
+    motor_angle, load_angle, current = y[k.TW] * plant.gear_ratio, log[row, k.TL], y[k.IM]
     signals[k.TRUE_MOTOR_ANGLE] = motor_angle
     signals[k.TRUE_LOAD_ANGLE] = load_angle
     signals[k.TRUE_TORQUE] = log[row, k.LOG_TORQUE]
     signals[k.TRUE_MOTOR_VELOCITY] = y[k.WW] * plant.gear_ratio
-    signals[k.TRUE_LOAD_VELOCITY] = y[k.WL]
+    signals[k.TRUE_LOAD_VELOCITY] = log[row, k.WL]
     numbers, noise, errors = sensors
     if numbers.shape[0] > 0:
         time, per = schedule.time, plant.gear_ratio  # the log holds the motor's angle at the output
@@ -309,6 +310,10 @@ def _loop(plant, spring, fx, controller, control, schedule, sensors, record):
         torque = eq.derivative(plant, spring, fx, mode, late[1], now, y, work)
         log[row, : k.N_STATES] = y[: k.N_STATES]
         log[row, k.LOG_TORQUE] = torque
+        if plant.structure == mp.RIGID_FREE:
+            error, slope = angle_error(fx, y[k.TW], plant.gear_ratio)
+            log[row, k.TL] += error
+            log[row, k.WL] *= 1.0 + slope
         if internal_states.shape[0] > 0:
             internal_states[row] = y
         _read(plant, schedule, sensors, row, y, log, signals)

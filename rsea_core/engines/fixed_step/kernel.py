@@ -34,6 +34,7 @@ import rsea_core.engines.fixed_step.stages as s
 import rsea_core.engines.fixed_step.step_inputs as i
 import rsea_core.engines.fixed_step.step_torques as t
 import rsea_core.engines.fixed_step.winding as w
+from rsea_core.effects.gear_transmission_error import angle_error
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.unowned import unowned
 
@@ -60,13 +61,21 @@ class State(NamedTuple):
 
 
 @njit(error_model="numpy", forceinline=True)
-def _readings(machine, torque, current, bodies, case_rise):
+def _readings(machine, fx, torque, current, bodies, case_rise):
     """What a row reads, `layout.CHANNELS`."""
-    ratio = machine.plant.gear_ratio
+    ratio, load, load_speed = machine.plant.gear_ratio, bodies.load, bodies.load_speed
+    if machine.rigid and machine.transmission_error and not machine.load_given:
+        error, slope = angle_error(fx, load, ratio)
+        load, load_speed = load + error, (1.0 + slope) * load_speed
     return (
-        bodies.gear * ratio, bodies.load, torque, current, case_rise, bodies.gear_speed * ratio,
-        bodies.load_speed,
-    )  # fmt: skip
+        bodies.gear * ratio,
+        load,
+        torque,
+        current,
+        case_rise,
+        bodies.gear_speed * ratio,
+        load_speed,
+    )
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -143,7 +152,8 @@ def kernel(full: bool, version: int):
         while True:
             bodies, winding, spring, motions, latest, gains_of = state
             spring = t.spring_in_row(machine, model.fx, y, model.spring, spring, bodies)
-            read = _readings(machine, spring.torque, winding.current, bodies, y[at.CASE_RISE])
+            current, fx, rise = winding.current, model.fx, y[at.CASE_RISE]
+            read = _readings(machine, fx, spring.torque, current, bodies, rise)
             if out.shape[0] > 0:
                 _keep(out, row - first, read)
             in_range = _in_range(bodies, winding.current, y[at.WINDING_RISE], asked)

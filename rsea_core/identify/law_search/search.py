@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.effects.sensor_drift import SensorDrift
 from rsea_core.effects.sensor_noise import SensorNoise
@@ -110,10 +111,8 @@ def begun(
     estimator = with_mean_commands(estimator, base)
     if not quick:
         estimator, base = settled(estimator, base)
-    problem = estimator.problem
-    found = Found(problem=problem, base_estimator=estimator, base=base, estimator=estimator,
-                  best=base, horizon=horizon, base_horizon=horizon)  # fmt: skip
-    return found
+    return Found(problem=estimator.problem, base_estimator=estimator, base=base, best=base,
+                 estimator=estimator, horizon=horizon, base_horizon=horizon)  # fmt: skip
 
 
 def searched(
@@ -178,14 +177,15 @@ def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
 def _observable(law: Law, estimator: Estimator) -> bool:
     """Whether the readings can show a law of a sensor: two of them tell which one is late.
 
-    One angle alone shows no offset: it is an angle of gravity, or none at all. One reading alone
-    shows no scale factor where the torque constant is free: either one multiplies the motion; and
-    no drift: a slow torque moves the machine as the reading would.
+    One angle alone shows no offset (it is an angle of gravity) and no error of a rigid train. One
+    reading alone shows no drift, which moves as by a slow torque, and no scale factor where the
+    torque constant is free.
     """
     single = all(len(t.experiment.channels) == 1 for t in estimator.tracks)
     angles = max(_angles(t.experiment) for t in estimator.tracks)
     constant = any(p.key == TORQUE_CONSTANT for p in estimator.problem.nominals)
     unseen = {
+        GearTransmissionError: angles < 2 and not estimator.problem.case.rig.has("spring"),
         SensorOffset: law.sensor in ANGLES and angles < 2,
         SensorDelay: single,
         SensorDrift: single,

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.machine.plant as mp
+from rsea_core.effects.gear_transmission_error import array_angle_error
 from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
@@ -52,6 +53,7 @@ LEAST_ROWS = 30  # of a recording
 LEAST_STEP_s = 1e-4  # of the engine, before it is made finer
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
 DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
+ANGLES = ("motor_angle_rad", "load_angle_rad")
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
                   "load_velocity_rad_per_s")  # fmt: skip
 
@@ -107,7 +109,7 @@ class Experiment:
     def read_twice(self) -> bool:
         """Whether two sensors read the angle of one rigid body: the motor's says where it is."""
         rigid = machine_of(self.base).structure in (mp.RIGID_FREE, mp.RIGID_HELD)
-        return rigid and {"motor_angle_rad", "load_angle_rad"} <= set(self.channels)
+        return rigid and set(ANGLES) <= set(self.channels)
 
     @cached_property
     def command_change(self) -> NDArray:
@@ -144,7 +146,24 @@ class Experiment:
             plant = machine_of(self.base)
             lag = plant.inductance / plant.resistance if plant.resistance > 0.0 else 0.0
             runs = runs_at(runs, self.ahead_s, rows_s, first, lag)
-        return readings_of(runs, machines, self.channels, self.where)
+        found = readings_of(runs, machines, self.channels, self.where)
+        if self.read_twice:
+            self._in_measured_phase(found, machines)
+        return found
+
+    def _in_measured_phase(self, found: NDArray, machines: Sequence[TrialMachine]) -> None:
+        """Take the error of a rigid gear train at the motor's angle as read, in readings (m, n, p).
+
+        It repeats with that angle: at a simulated one, half a turn off, its sign would be wrong.
+        """
+        motor, load = (self.channels.index(name) for name in ANGLES)
+        ratio = self.where.ratio
+        for y, d in zip(found, machines, strict=True):
+            read, run = (
+                array_angle_error(d.fx, angle / ratio, ratio)
+                for angle in (self.measured[:, motor], y[:, motor])
+            )
+            y[:, load] += read - run
 
     def states(self, run: NDArray) -> NDArray:
         """Current, wheel angle and speed, load angle and speed (n, 5) of one run (n, 7)."""

@@ -376,12 +376,13 @@ def test_a_gear_that_errs_leaves_the_spring_slack_where_the_angles_are_zero():
 def test_term_that_a_machine_cannot_have_is_refused_in_one_line():
     rigid = replace(BENCH, parts=("drive", "gear", "load"))
     duty = Inputs(time_s=TIME, duty=np.zeros(TIME.size))
+    held = Inputs(time_s=TIME, duty=np.zeros(TIME.size), load=Load(kind="locked"))
     current = Inputs(time_s=TIME, current_command_A=np.zeros(TIME.size))
     curve = SpringCurve(deflection_rad=[-0.2, 0.0, 0.3], torque_Nm=[-13.0, 0.0, 25.0])
     error = GearTransmissionError(wheel_amplitude_rad=0.01)
     hardening = SpringHardening(stiffness_ratio_at_0p15rad=2.0)
     for rig, terms, inputs, message in (
-        (rigid, (error,), duty, "needs a spring"),
+        (rigid, (error,), held, "needs a spring where the load is held"),
         (replace(BENCH, parts=("load",)), (error,), Inputs(time_s=TIME), 'has no "gear"'),
         (rigid, (hardening,), duty, 'has no "spring"'),
         (BENCH, (DriveDeadTime(width_duty=0.1),), current, "needs a drive by duty"),
