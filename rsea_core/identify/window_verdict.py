@@ -50,7 +50,11 @@ from rsea_core.identify.window_fit import (
     strained_value,
     unknown_torque,
 )
-from rsea_core.identify.window_formula import gain_over_named, unnamed_formula
+from rsea_core.identify.window_formula import (
+    command_formula_of,
+    gain_over_named,
+    unnamed_formula,
+)
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
@@ -76,6 +80,8 @@ class WindowVerdict(Conclusion):
         self.unknown = self.formula = None
         if not found.complete and (found.steps or not found.sound):
             self.unknown, self.formula = unnamed_formula(found, self._unknown_shape(), say, instead)
+        elif not found.complete and found.beyond_noise:
+            self.formula = command_formula_of(found, say)
         if self.formula is not None:
             self.fit = fit_of(self.formula.estimator, self.formula.fit)
             self.estimator = self.formula.estimator

@@ -8,7 +8,7 @@ from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
-from rsea_core.identify.multistep.criteria import SOUND
+from rsea_core.identify.multistep.criteria import LEAST_EXCESS, SOUND
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 
@@ -72,6 +72,8 @@ class Found:
     left_by_parameters : float
         What parameters alone leave of whole recordings, in deviations of the sensors' noise
         (`whole_runs`); inf: not known.
+    excess : float
+        What these errors cost more than that noise, in units.
     sound_below : float
         Of these deviations, the number below which parameters are all that there is.
     complete : bool
@@ -96,6 +98,7 @@ class Found:
     shapes: list[Shape] = field(default_factory=list)
     screened: list[Candidate] = field(default_factory=list)
     left_by_parameters: float = np.inf
+    excess: float = 0.0
     sound_below: float = SOUND
     complete: bool = False
     explained: float = 1.0
@@ -104,6 +107,11 @@ class Found:
     def sound(self) -> bool:
         """Whether parameters alone predict whole recordings to the sensors' noise."""
         return self.left_by_parameters < self.sound_below
+
+    @property
+    def beyond_noise(self) -> bool:
+        """Whether errors of whole recordings, however small, cost clearly more than noise would."""
+        return self.excess >= LEAST_EXCESS
 
     @property
     def acts_once(self) -> bool:

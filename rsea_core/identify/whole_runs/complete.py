@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.search import begun, laws_of
@@ -62,10 +63,11 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     if left <= SOUND and is_coloured(found.base_estimator):
         own, plain, left = _in_noise_of_best_law(found, own, plain, say)
         found = replace(found, left_by_parameters=left, sound_below=SOUND_IN_LEFT_NOISE)
-    if found.sound or not left < np.inf:
+    found = replace(found, excess=excess(own, plain.hypothesis, plain.x))
+    if (found.sound and not found.beyond_noise) or not left < np.inf:
         return found, None
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
-    for _ in range(WHOLE_LAWS):
+    for _ in range(1 if found.sound else WHOLE_LAWS):
         if search.left() <= search.enough or not search.add(say):
             break
         search.prune(say)
@@ -73,8 +75,11 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         search.refine(say)
         search.compare(say)
         search.predict(say)
-        if search.complete(say):
+        of_log = found.sound and _within_half_a_row(search)
+        if not of_log and search.complete(say):
             return _complete(found, search), None
+    if found.sound:  # what is left may be any small thing
+        return found, None
     nearly = _nearly_complete(found, search, say)
     timing = _other_timing(search) if again and search.taken else None
     if timing is not None:
@@ -112,6 +117,15 @@ def _in_noise_of_best_law(
     plain, left = _parameters_alone(own, plain)
     say(f"  whole recordings: in the noise left by {trials[0].law.key} parameters leave {left:.2f}")
     return own, plain, left
+
+
+def _within_half_a_row(search: WholeSearch) -> bool:
+    """Whether the law taken is a reading's delay that is as short as a log's own."""
+    _, values = search.own.problem.values(search.fit.hypothesis, search.fit.x)
+    row_s = min(t.experiment.recording.sample_time_s for t in search.own.tracks)
+    late = [v["delay_s"] for law, v in zip(search.fit.hypothesis.laws, values, strict=True)
+            if law.kind is SensorDelay]  # fmt: skip
+    return any(abs(delay_s) < 0.5 * row_s for delay_s in late)
 
 
 def _other_timing(search: WholeSearch) -> CommandTiming | None:
