@@ -59,7 +59,7 @@ def axis_rig(units: Units = Units(), *, off: float = 1.0) -> Rig:
 def axis_recording(
     *terms, seed: int, units: Units = Units(), offset_A: float = 0.0, delay_rows: float = 0.0,
     linear: bool = False, role: str = "identification", uneven: float = 0.0,
-    rig: Rig | None = None,
+    rig: Rig | None = None, two_levels: bool = False,
 ) -> Recording:  # fmt: skip
     """Twelve seconds of an axis (in the unit of time) that is driven to and fro, read by counts.
 
@@ -69,6 +69,8 @@ def axis_recording(
         Standard deviation, in rows, of the times of readings about those of the commands.
     rig : Rig or None
         Of the machine; None: `axis_rig`.
+    two_levels : bool
+        One size of the command, of both signs, after a second of zero.
     """
     rng = np.random.default_rng(seed)
     n = 1200
@@ -77,6 +79,8 @@ def axis_recording(
     current = sum(
         1.2 * np.sin(2.0 * np.pi * f * tau + rng.uniform(0.0, 6.0)) for f in (0.31, 0.83, 1.9)
     )
+    if two_levels:
+        current = np.where(tau < 1.0, 0.0, 1.5 * np.sign(current))
     own = [*terms]
     if offset_A:
         own.append(DriveOffset(offset=offset_A))
