@@ -294,7 +294,8 @@ class GearTransmissionError(Term):
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """One wave of wheel or worm, both, and their harmonics."""
         deflection = typical.deflection_rad
-        rigid = typical.relative and not typical.rig.has("spring")  # the error is all of it
+        rig = typical.rig
+        rigid = typical.relative and (rig is None or not rig.has("spring"))
         most = (4.0 if rigid else 1.5 if typical.relative else 0.3) * deflection
         bounds = {"scale": 0.02 * deflection, "low": -most, "high": most}
 

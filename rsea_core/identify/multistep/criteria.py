@@ -82,6 +82,7 @@ SENSOR_COLOUR_ROWS = 20  # time constant of a sensor's coloured noise at most; l
 SENSORS_ALONE = 0.003  # of the estimated unknown torques, where the sensors' noise is all there is
 COMPLETE = 1.6  # misfit of whole recordings in noise deviations that is as good as none
 SOUND = 2.0  # misfit of parameters alone, below which nothing lacks
+SHAPE_SHARE = 0.5  # of what parameters leave of whole recordings: least held-out gain of a shape
 LEAST_EXCESS = 100.0  # units above that noise, below which parameters alone are not doubted
 SOUND_IN_LEFT_NOISE = 1.4  # the same in the noise that the best law leaves
 COMPLETE_SHARE = 0.08  # or of what parameters alone leave: small things that every machine has

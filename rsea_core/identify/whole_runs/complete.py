@@ -7,7 +7,9 @@ import numpy as np
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found, Step
+from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.search import begun, laws_of
+from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.command_timing import CommandTiming, timings
 from rsea_core.identify.multistep.criteria import (
     COMPLETE,
@@ -17,6 +19,7 @@ from rsea_core.identify.multistep.criteria import (
     LEFT_OF_EACH,
     PER_VALUE,
     RICHER_GAIN,
+    SHAPE_SHARE,
     SOUND,
     SOUND_IN_LEFT_NOISE,
     UNPREDICTED,
@@ -199,7 +202,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         if misfit(own, best.hypothesis, best.x) < share * left:
             return nearly
     if not found.steps:
-        return found
+        return _with_shape(found, own, say)
     say(f"whole recordings: what windows showed leaves {left:.2f}")
     enough = _enough(found.left_by_parameters)
     if left <= enough:
@@ -210,6 +213,20 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         return found
     plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
     return replace(found, complete=unseen_share(found, own, fit, plain, say) < UNPREDICTED)
+
+
+def _with_shape(found: Found, own: Estimator, say) -> Found:
+    """What was found, and the torque of unknown shape that explains most of what parameters leave.
+
+    In windows a slow torque can pass for noise that whole recordings do not have.
+    """
+    plain, _ = _parameters_alone(own, found.base)
+    best = next(iter(shapes(Projection(own, plain))), None)
+    had = excess(own, plain.hypothesis, plain.x)
+    if best is None or best.held_out < SHAPE_SHARE * had:
+        return found
+    say(f"whole recordings: {best.sentence()}, explains {best.held_out / had:.2f} of what is left")
+    return replace(found, base_shapes=[best, *found.base_shapes])
 
 
 def _without_redundant(
