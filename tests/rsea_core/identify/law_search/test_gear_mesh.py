@@ -155,3 +155,16 @@ def test_backlash_before_the_mesh_predicts_what_no_rigid_train_does(cases):
     assert fit.cost < whole.base.cost - 500.0  # units of log-likelihood, beside the elastic mesh
     # a rigid train errs by that wherever the load stands in its play (uniform distribution)
     assert error(whole.estimator, h, fit.x) < WIDTH / math.sqrt(12.0) < before
+
+
+def test_the_error_of_a_rigid_train_is_taken_at_the_motors_angle_as_read(cases):
+    problem = MultistepProblem(cases[0.0])
+    (experiment,) = problem.fitted
+    law = catalogue(cases[0.0], relative=True)["gear-transmission-error/worm"]
+    h, amplitude = Hypothesis(laws=(law,)), 2e-4
+    x = problem.start(h, [(amplitude, 0.0, 0.0)])
+    x[0] += 3.0  # a machine that moves otherwise than the one recorded
+    motor, load = problem.predict(experiment, h, x[None])[0].T
+    read = experiment.measured[:, 0]
+    assert np.max(np.abs(motor - read)) > 1.0  # a turn of the wave is 6.3 rad
+    np.testing.assert_allclose(load - motor / RATIO, amplitude * np.sin(read), atol=1e-9)

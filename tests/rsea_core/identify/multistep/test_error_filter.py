@@ -9,8 +9,10 @@ from rsea_core.identify.multistep.estimator import Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, innovations, smoothed
 from rsea_core.identify.multistep.noise_estimate import estimated_noise
-from rsea_core.identify.multistep.tracks import initial_track
+from rsea_core.identify.multistep.tracks import initial_track, start_variances
+from rsea_core.recordings.case import Case
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+from tests.cases.planted import RIG, recording
 
 ROW_s = 0.02
 
@@ -95,3 +97,15 @@ def test_the_noise_of_a_recording_is_found_and_its_innovations_are_independent(t
     count = 2.0 * np.pi / 4096
     assert noise.readings[0] == pytest.approx(count / np.sqrt(12.0), rel=0.5)
     assert independent_share(estimator.having(tracks), plain, x) > 0.2
+
+
+def test_readings_begin_with_an_unknown_zero_except_that_of_a_torque_sensor(tmp_path):
+    case = Case(name="planted", folder=tmp_path, rig=RIG,
+                recordings=(recording((), "locked", "locked.csv", 1),))  # fmt: skip
+    (experiment,) = MultistepProblem(case).fitted
+    track = initial_track(experiment)
+    (start,) = start_variances(track, track.errors)
+    floors = dict(zip(experiment.channels, experiment.floor_of_each, strict=True))
+    zero = dict(zip(experiment.channels, track.errors.constants, strict=True))
+    assert start[zero["load_angle_rad"]] == pytest.approx(floors["load_angle_rad"] ** 2)
+    assert start[zero["torque_Nm"]] < 1e-12 * floors["torque_Nm"] ** 2

@@ -120,6 +120,18 @@ def test_one_law_that_is_nearly_all_stands_where_windows_show_nothing_or_leave_m
     assert confirmed_by_whole_runs(as_good, nearly, lambda text: None) is not nearly
 
 
+def test_a_shape_that_explains_most_of_whole_recordings_is_kept_where_no_law_was_found(
+    sprung, completed
+):
+    left = replace(sprung, left_by_parameters=completed.left_by_parameters)
+    found = confirmed_by_whole_runs(left, None, lambda text: None)
+    assert not found.steps
+    first = found.base_shapes[0]
+    assert first.signal.endswith("angle")  # a parallel spring's torque
+    assert first.held_out > 4.5 * first.deviation
+    assert confirmed_by_whole_runs(left.parameters_alone(), completed, lambda _: None).steps
+
+
 def test_a_law_with_more_values_takes_the_place_of_one_that_is_not_quite_it(tmp_path):
     spring = StiffeningParallel(stiffness_Nm_per_rad=0.01, cubic_Nm_per_rad3=0.05, up_to_rad=9.0)
     found, _ = with_whole_runs(parameters_alone(tmp_path, spring), lambda text: None)
