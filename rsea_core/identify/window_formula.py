@@ -139,7 +139,8 @@ def unnamed_formula(
 ) -> tuple[Shape | None, Formula | CommandFormula | None]:  # fmt: skip
     """What has no name: its shape, and a formula of the command if that predicts, or of the motion.
 
-    A formula of the command takes the place of the shape; beside laws there is none.
+    A formula of the command takes the place of the shape; beside laws there is none. Where
+    parameters leave little more than noise, that formula alone is tried.
 
     Parameters
     ----------
@@ -150,6 +151,8 @@ def unnamed_formula(
         return None, instead
     if found.steps:
         return shape, None
+    if found.sound:
+        return None, command_formula_of(found, say) if found.beyond_noise else None
     if shape is None or shape.signal in ("command", "current"):
         formula = command_formula_of(found, say)
         if formula is not None:

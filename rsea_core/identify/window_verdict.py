@@ -50,11 +50,7 @@ from rsea_core.identify.window_fit import (
     strained_value,
     unknown_torque,
 )
-from rsea_core.identify.window_formula import (
-    command_formula_of,
-    gain_over_named,
-    unnamed_formula,
-)
+from rsea_core.identify.window_formula import gain_over_named, unnamed_formula
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
@@ -78,10 +74,8 @@ class WindowVerdict(Conclusion):
         self.fit = fit_of(found.estimator, found.best) if found.steps else plain
         self.estimator = found.estimator if found.steps else found.base_estimator
         self.unknown = self.formula = None
-        if not found.complete and (found.steps or not found.sound):
+        if not found.complete:
             self.unknown, self.formula = unnamed_formula(found, self._unknown_shape(), say, instead)
-        elif not found.complete and found.beyond_noise:
-            self.formula = command_formula_of(found, say)
         if self.formula is not None:
             self.fit = fit_of(self.formula.estimator, self.formula.fit)
             self.estimator = self.formula.estimator

@@ -69,6 +69,9 @@ def _feels_gravity(rig: Rig, load: Load) -> bool:
     return load.kind in FELT_GRAVITY and (load.kind != "contact" or stated)
 
 
+KINEMATIC = {"wheel_error"}  # numbers that move a rigid load against its wheel
+
+
 @dataclass(frozen=True)
 class ActuatorModel:
     """A rig and the terms that extend or replace parts of its nominal equations.
@@ -162,8 +165,7 @@ class ActuatorModel:
         found, setter = _numbers_of_servo(self.rig, command_name), {}
         for term, numbers in zip(acting, given, strict=True):
             obstacle = term.needs(command_name, rigid, len(dry))
-            bound = dry & numbers.keys() or "wheel_error" in numbers
-            if obstacle is None and rigid and load.is_held and bound:
+            if obstacle is None and rigid and load.is_held and numbers.keys() & (dry | KINEMATIC):
                 obstacle = "needs a spring where the load is held"
             if obstacle is not None:
                 raise TermError(f"{term.effect} on rig {self.rig.name!r}: {obstacle}")

@@ -22,10 +22,10 @@ def stated(wheel: np.ndarray) -> np.ndarray:
     """e(theta) - e(0) + offset of the class's docstring."""
     ratio = RIGID.rig.gear_ratio
 
-    def waves(at):
+    def sines(at):
         return 2e-3 * np.sin(at + 0.4) + 4e-4 * np.sin(ratio * at)
 
-    return waves(wheel) - waves(0.0) + 1e-3
+    return sines(wheel) - sines(0.0) + 1e-3
 
 
 def simulated() -> dict[str, np.ndarray]:
