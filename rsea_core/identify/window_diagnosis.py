@@ -254,13 +254,14 @@ def _fitted_of_held_out(conclusion: WindowVerdict) -> list[str]:
         f"{file}: its first two thirds were fitted, for {why}; the last third stayed held out"
         for file, why in conclusion.found.shared.items()
     ]
-    if conclusion.found.pause_shown:
-        pause_s = next(v["pause_s"] for v in conclusion.laws if "pause_s" in v)
-        found.append(
-            f"the motor rested about {pause_s:.0f} s before the recordings held out: they alone"
-            " show it, and nothing else was fitted to them"
-        )
-    return found
+    pauses = [v["pause_s"] for v in conclusion.laws if "pause_s" in v]
+    if not conclusion.found.pause_shown:
+        pauses = []
+    return found + [
+        f"the motor rested about {pause_s:.0f} s before the recordings held out: they alone"
+        " show it, and nothing else was fitted to them"
+        for pause_s in pauses
+    ]
 
 
 def _span(conclusion: WindowVerdict) -> float:
