@@ -16,7 +16,7 @@ BY_SIGN, BY_SIZE, BY_SQUARE = slots(
     "command_gain_by_sign", "command_gain_by_size", "command_gain_by_square"
 )
 
-USUAL = 0.3  # change of the gain up to the full command, as a prior
+GAIN_PRIOR = 0.3  # standard deviation of the change of the gain up to the largest command
 
 
 @njit(error_model="numpy", inline="always")
@@ -88,12 +88,12 @@ class DriveNonlinearGain(Term):
         span : float
             Largest command, in its unit.
         """
-        # a command of two levels shows neither size nor square: their priors keep them finite
-        sign = Unknown(name="by_sign", unit="-", low=-0.9, high=0.9, scale=0.005, prior=USUAL)
+        # two levels of the command determine neither size nor square: only the priors bound them
+        sign = Unknown(name="by_sign", unit="-", low=-0.9, high=0.9, scale=0.005, prior=GAIN_PRIOR)
         size = Unknown(name="by_size", unit="-", low=-0.9 / span, high=0.9 / span,
-                       scale=0.01 / span, prior=USUAL / span)  # fmt: skip
+                       scale=0.01 / span, prior=GAIN_PRIOR / span)  # fmt: skip
         square = Unknown(name="by_square", unit="-", low=-0.9 / span**2, high=0.9 / span**2,
-                         scale=0.01 / span**2, prior=USUAL / span**2)  # fmt: skip
+                         scale=0.01 / span**2, prior=GAIN_PRIOR / span**2)  # fmt: skip
         return Law(
             effect=cls.effect, law=cls.law, subsystem="drive", kind=cls,
             write=writes_numbers(cls), unknowns=(sign, size, square), starts=((0.0, 0.0, 0.0),),

@@ -294,9 +294,11 @@ class GearTransmissionError(Term):
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
         """One wave of wheel or worm, both, and their harmonics."""
         deflection = typical.deflection_rad
-        rig = typical.rig
-        rigid = typical.relative and (rig is None or not rig.has("spring"))
-        most = (4.0 if rigid else 1.5 if typical.relative else 0.3) * deflection
+        rigid, times = False, 0.3  # largest error, in deflections
+        if typical.relative:
+            rigid = typical.rig is None or not typical.rig.has("spring")  # None: to read any file
+            times = 4.0 if rigid else 1.5  # of a rigid train the error is all that the ends differ
+        most = times * deflection
         bounds = {"scale": 0.02 * deflection, "low": -most, "high": most}
 
         def pair(part: str, wave: str, prior: float) -> tuple[Unknown, ...]:

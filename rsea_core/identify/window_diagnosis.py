@@ -258,8 +258,8 @@ def _fitted_of_held_out(conclusion: WindowVerdict) -> list[str]:
     if not conclusion.found.pause_shown:
         pauses = []
     return found + [
-        f"the motor rested about {pause_s:.0f} s before the recordings held out: they alone"
-        " show it, and nothing else was fitted to them"
+        f"the pause of the motor before the recordings held out, about {pause_s:.0f} s, was"
+        " estimated from them, and nothing else was"
         for pause_s in pauses
     ]
 

@@ -56,6 +56,9 @@ def energy_ledger(
         return read_only(np.ascontiguousarray(log[:, k.LOG_INTEGRALS + index]))
 
     current, motor, motor_speed, load, load_speed = log[:, : k.N_STATES].T
+    rigid = plant.structure == mp.RIGID_FREE
+    if rigid:  # its load is logged with a transmission error, whose torques no equation has
+        load, load_speed = motor, motor_speed
     winding = plant.inductance if plant.drive in (mp.DUTY, mp.VOLTAGE) else 0.0
     wheel, kinetic, stored, impact = motor, 0.0, stored_J(fx, motor, load), 0.0 * motor
     if internal_states.shape[0] > 0:
@@ -65,7 +68,9 @@ def energy_ledger(
             wheel = internal_states[:, k.TB]
             behind = fx[e.BACKLASH_INERTIA]
             kinetic = kinetic + 0.5 * behind * (internal_states[:, k.WB] ** 2 - motor_speed**2)
-    deflection = wheel + array_angle_error(fx, wheel, plant.gear_ratio) - load
+    deflection = wheel - load
+    if not rigid:
+        deflection = deflection + array_angle_error(fx, wheel, plant.gear_ratio)
     if internal_states.shape[0] > 0:
         stored = stored + _remembered_J(fx, internal_states, deflection)
     beyond = np.zeros(load.size)

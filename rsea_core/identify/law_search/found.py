@@ -68,14 +68,14 @@ class Found:
     shared : dict of str
         Recordings held out of which a part was fitted, and why (`hold_out.with_shared_recordings`).
     pause_shown : bool
-        Whether recordings held out told how long the motor rested before them.
+        Whether the pause before recordings held out was estimated from these.
     left_by_parameters : float
         What parameters alone leave of whole recordings, in deviations of the sensors' noise
         (`whole_runs`); inf: not known.
     excess : float
-        What these errors cost more than that noise, in units.
+        Cost of these errors above that of the noise, in units.
     sound_below : float
-        Of these deviations, the number below which parameters are all that there is.
+        Misfit, in these deviations, below which parameters alone are sufficient.
     complete : bool
         Whether laws stand by whole recordings: they leave nothing but that noise, or little more.
     explained : float
@@ -110,7 +110,7 @@ class Found:
 
     @property
     def beyond_noise(self) -> bool:
-        """Whether errors of whole recordings, however small, cost clearly more than noise would."""
+        """Whether parameters alone leave errors of a cost that noise does not explain."""
         return self.excess >= LEAST_EXCESS
 
     @property

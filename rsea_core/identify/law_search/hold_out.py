@@ -27,7 +27,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
 SHARED, LAST = 2.0 / 3.0, 0.25  # of a recording's rows
-PAUSES_s = (1.0, 30.0, 300.0, 3000.0)  # that are tried between two recordings
+PAUSES_s = (1.0, 30.0, 300.0, 3000.0)  # trial values of the pause between two recordings
 
 
 def part_of(r: Recording, first: int, last: int, **changes) -> Recording:

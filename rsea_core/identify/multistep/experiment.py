@@ -154,7 +154,8 @@ class Experiment:
     def _in_measured_phase(self, found: NDArray, machines: Sequence[TrialMachine]) -> None:
         """Take the error of a rigid gear train at the motor's angle as read, in readings (m, n, p).
 
-        It repeats with that angle: at a simulated one, half a turn off, its sign would be wrong.
+        The error repeats with that angle. At a simulated angle that differs by half a turn of the
+        motor it would have the wrong sign.
         """
         motor, load = (self.channels.index(name) for name in ANGLES)
         ratio = self.where.ratio

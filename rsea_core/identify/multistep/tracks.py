@@ -140,7 +140,7 @@ def start_variances(t: Track, errors: LinearErrors) -> NDArray:
     if errors.slow >= 0:
         start[:, errors.slow] = t.noise.inputs[3] ** 2
     for j, at in enumerate(errors.constants):
-        if at >= 0 and t.experiment.channels[j] != "torque_Nm":  # its zero is no angle's
+        if at >= 0 and t.experiment.channels[j] != "torque_Nm":  # has no unknown zero angle
             start[:, at] = t.experiment.floor_of_each[j] ** 2
     start[:, errors.colours] = t.noise.colours**2
     return np.maximum(start, 1e-30)

@@ -67,6 +67,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         own, plain, left = _in_noise_of_best_law(found, own, plain, say)
         found = replace(found, left_by_parameters=left, sound_below=SOUND_IN_LEFT_NOISE)
     found = replace(found, excess=excess(own, plain.hypothesis, plain.x))
+    say(f"whole recordings: these errors cost {found.excess:.0f} units more than noise")
     if (found.sound and not found.beyond_noise) or not left < np.inf:
         return found, None
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
@@ -81,7 +82,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         of_log = found.sound and _within_half_a_row(search)
         if not of_log and search.complete(say):
             return _complete(found, search), None
-    if found.sound:  # what is left may be any small thing
+    if found.sound:  # an error that small is not evidence of a law that explains a part of it
         return found, None
     nearly = _nearly_complete(found, search, say)
     timing = _other_timing(search) if again and search.taken else None
@@ -123,7 +124,7 @@ def _in_noise_of_best_law(
 
 
 def _within_half_a_row(search: WholeSearch) -> bool:
-    """Whether the law taken is a reading's delay that is as short as a log's own."""
+    """Whether the law taken is a sensor's delay of less than half a row, as sampling causes."""
     _, values = search.own.problem.values(search.fit.hypothesis, search.fit.x)
     row_s = min(t.experiment.recording.sample_time_s for t in search.own.tracks)
     late = [v["delay_s"] for law, v in zip(search.fit.hypothesis.laws, values, strict=True)
@@ -223,9 +224,12 @@ def _with_shape(found: Found, own: Estimator, say) -> Found:
     plain, _ = _parameters_alone(own, found.base)
     best = next(iter(shapes(Projection(own, plain))), None)
     had = excess(own, plain.hypothesis, plain.x)
-    if best is None or best.held_out < SHAPE_SHARE * had:
+    if best is None or had == 0.0:
         return found
-    say(f"whole recordings: {best.sentence()}, explains {best.held_out / had:.2f} of what is left")
+    share = best.held_out / had
+    say(f"whole recordings: {best.sentence()}, explains {share:.2f} of the excess")
+    if share < SHAPE_SHARE:
+        return found
     return replace(found, base_shapes=[best, *found.base_shapes])
 
 

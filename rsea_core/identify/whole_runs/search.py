@@ -106,10 +106,10 @@ class WholeSearch:
         least = max(max(worth, default=0.0) - self.doubt(), LEAST_OF_LEFT * self.plain_excess())
         if self.better_form(least, LEFT_OF_EACH, say):
             return True
+        for best in trials[:1]:
+            say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
         if not worth or worth[0] < LEAST_OF_LEFT * self.plain_excess():
             return False
-        best = trials[0]
-        say(f"  whole recordings: {best.law.key} gains {best.gain:.0f}, leaves {best.left:.2f}")
         self.first = self.first or trials
         fit = self.own.fit(best.fit.hypothesis, best.fit.x, iterations=CONVERGED)
         self.fit = well_fitted(self.own, fit)

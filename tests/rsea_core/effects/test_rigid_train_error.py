@@ -60,3 +60,10 @@ def test_the_error_moves_no_body():
     with_error, without = (Replay.of(INPUTS).run(model) for model in (RIGID, plain))
     motor = CHANNELS.index("motor_angle_rad")
     np.testing.assert_array_equal(with_error[:, motor], without[:, motor])
+
+
+def test_the_energy_of_a_rigid_train_balances_with_the_error():
+    energy = simulate(RIGID, INPUTS).energy
+    supplied = np.max(np.abs(energy.supplied_J))
+    assert supplied > 0.1
+    assert np.max(np.abs(energy.imbalance_J())) < 1e-9 * supplied
