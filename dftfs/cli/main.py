@@ -5,6 +5,7 @@ import importlib
 import os
 import signal
 import sys
+from contextlib import suppress
 
 from dftfs import __version__
 from dftfs.cli.budgets import budgets
@@ -73,6 +74,11 @@ def _run(given: list[str]) -> int:
     try:
         with budgets(arguments):
             status = int(arguments.run(arguments))
+    except BaseException:
+        if folder := getattr(arguments, "made_folder", None):
+            with suppress(OSError):  # it holds files
+                folder.rmdir()
+        raise
     finally:
         record_command(None)
     sys.stdout.flush()  # a full disk behind standard output shows here, not at exit

@@ -21,12 +21,14 @@ def output_folder(arguments: argparse.Namespace, name: str) -> Path | None:
     OutputError
         If it cannot be made or written to.
     """
-    if arguments.out is not None:
-        return prepare_folder(arguments.out)
-    if arguments.json:
-        return None
-    folder = default_folder(arguments, name)
-    progress()(f"files go to {folder} (--out chooses another folder)")
+    folder = arguments.out
+    if folder is None:
+        if arguments.json:
+            return None
+        folder = default_folder(arguments, name)
+        progress()(f"files go to {folder} (--out chooses another folder)")
+    if not folder.exists():
+        arguments.made_folder = folder  # a command that fails removes it if it is empty
     return prepare_folder(folder)
 
 

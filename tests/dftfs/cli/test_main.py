@@ -184,3 +184,42 @@ def test_a_budget_of_gigabytes_is_one_line_and_over_afterwards(monkeypatch, caps
 def test_an_impossible_budget_is_one_line(words, capsys):
     assert main(["materials", *words]) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+REFUSED_WHEN_RUN = """
+name = "rigid"
+[rig]
+name = "train"
+parts = ["drive", "gear", "load"]
+supply_voltage_V = 12.0
+terminal_resistance_ohm = 2.5
+torque_constant_Nm_per_A = 0.02
+back_emf_constant_Vs_per_rad = 0.02
+motor_inertia_kgm2 = 1.6e-6
+gear_ratio = 50.0
+load_inertia_kgm2 = 0.003
+[load]
+kind = "locked"
+[reference]
+kind = "sine"
+amplitude_Nm = 0.1
+frequency_Hz = 1.0
+[controller]
+kind = "pid-torque"
+kp = 1.0
+ki = 1.0
+kd = 0.0
+[simulation]
+duration_s = 1.0
+"""
+
+
+@pytest.mark.parametrize("existed", [False, True])
+def test_a_command_that_fails_removes_the_empty_folder_that_it_made(tmp_path, capsys, existed):
+    scenario, folder = tmp_path / "s.toml", tmp_path / "files"
+    scenario.write_text(REFUSED_WHEN_RUN, encoding="utf-8")
+    if existed:
+        folder.mkdir()
+    assert main(["simulate", str(scenario), "--out", str(folder)]) == 2
+    assert "no spring between wheel and load" in capsys.readouterr().err
+    assert folder.exists() == existed
