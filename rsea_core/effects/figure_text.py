@@ -19,8 +19,8 @@ READINGS = {
 }
 SCALED = ((1e-9, 1e-4, 1e6, "µ"), (1e-4, 0.1, 1e3, "m"))
 PREFIXED = ("Nm", "rad", "N", "m", "s", "A", "J")
-LINEAR = {"Nm": "N", "Nms": "Ns", "rad": "m", "kgm2": "kg", "kg m2": "kg"}
-_ANGULAR = re.compile(r"\b(?:Nms?|rad|kg ?m2)\b")
+LINEAR = {"Nm": "N", "Nms": "Ns", "rad": "m", "kgm2": "kg", "kg m2": "kg", "kg m^2": "kg"}
+_ANGULAR = re.compile(r"\b(?:Nms?|rad|kg ?m\^?2)\b")
 
 
 def linear_units(text: str) -> str:

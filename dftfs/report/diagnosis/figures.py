@@ -254,8 +254,9 @@ def law_figure(law: LawCurve, number: int) -> ReportFigure:
         axes.plot(law.x, law.found, color=BLUE, label="found")
         axes.set_xlabel(law.x_label)
         axes.set_ylabel(law.y_label)
-        axes.set_title(law.title)
-        axes.legend(loc="best")
+        axes.set_title(law.title, pad=22)
+        # outside: a periodic law fills the axes
+        axes.legend(loc="lower left", bbox_to_anchor=(-0.02, 0.99), ncols=3)
         return as_svg(
             figure,
             name=f"law-{number}",

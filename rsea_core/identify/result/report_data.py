@@ -35,6 +35,8 @@ SHOWN_SIGNATURES = 6  # signatures
 WEIGHED = "the recordings that were fitted; free values and moves of constants are paid for"
 LEFT_OUT = ("left out", "torques and mismatch at the ports: run without --quick to see them")
 LOST_ANGLE = (GearBacklash.effect, GearTransmissionError.effect)
+ROTARY = ("motor_angle", "motor_velocity", "motor_inertia", "motor_viscous", "torque_constant",
+          "back_emf_constant")  # fmt: skip
 AT = {"V": "at the winding", "G": "at the gear", "S": "in the spring", "L": "on the load"}
 
 
@@ -97,15 +99,26 @@ def report_data(
             "shares": {place: conclusion.residual.share},
             "traces": _unknown(conclusion.residual),
         }
-    return _in_linear_units(found) if rig.axis == "linear" else found
+    if rig.axis != "linear":
+        return found
+    screw = (rig.gear_ratio or 1.0) != 1.0  # or a pinion: its motor turns
+    return _in_linear_units(found, ROTARY if screw else ())
 
 
-def _in_linear_units(page: Any, key: str = "") -> Any:
-    """The page with metres and newtons as units, in labels of axes and in sentences on shapes."""
+def _in_linear_units(page: Any, rotary: tuple[str, ...], key: str = "") -> Any:
+    """The page with metres and newtons as units, in labels of axes and in sentences on shapes.
+
+    Parameters
+    ----------
+    rotary : tuple of str
+        First letters of signals and values that keep radians.
+    """
     if isinstance(page, dict):
-        return {name: _in_linear_units(value, name) for name, value in page.items()}
+        if str(page.get("signal") or page.get("name")).startswith(rotary):
+            return page
+        return {name: _in_linear_units(value, rotary, name) for name, value in page.items()}
     if isinstance(page, (list, tuple)):
-        return type(page)(_in_linear_units(value, key) for value in page)
+        return type(page)(_in_linear_units(value, rotary, key) for value in page)
     is_text = key in ("unit", "sentence", "signatures") or key.endswith("label")
     return linear_units(page) if is_text and isinstance(page, str) else page
 

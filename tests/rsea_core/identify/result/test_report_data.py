@@ -134,12 +134,30 @@ def test_the_law_found_is_drawn_with_a_band_that_holds_the_truth(diagnosis, show
     assert np.all(law["nominal"][fast] < 0.5 * law["found"][fast])
 
 
-def test_units_of_a_linear_machine_are_metres_and_newtons(diagnosis):
+def linear_page(diagnosis, **changes) -> dict:
     conclusion = copy(diagnosis.conclusion)
     case = conclusion.case
-    conclusion.case = replace(case, rig=replace(case.rig, axis="linear"))
-    page = report_data(replace(diagnosis, conclusion=conclusion), quick=True)
-    units = {row["unit"] for row in page["comparisons"] + page["scores"] + page["parameters"]}
-    assert {"N", "A"} <= units
-    assert not any("Nm" in unit or "rad" in unit for unit in units)
+    conclusion.case = replace(case, rig=replace(case.rig, axis="linear", **changes))
+    return report_data(replace(diagnosis, conclusion=conclusion), quick=True)
+
+
+def units_of(page: dict) -> dict[str, str]:
+    signals = {row["signal"]: row["unit"] for row in page["comparisons"] + page["scores"]}
+    return signals | {row["name"]: row["unit"] for row in page["parameters"]}
+
+
+def test_units_of_a_linear_machine_are_metres_and_newtons(diagnosis):
+    page = linear_page(diagnosis, gear_ratio=1.0)
+    units = set(units_of(page).values())
+    assert {"N", "A", "m"} <= units
+    assert not any("Nm" in unit or "rad" in unit or "m^2" in unit for unit in units)
+    assert all("Nm" not in law["y_label"] for law in page["laws"])
+
+
+def test_the_motor_of_a_screw_turns_in_radians(diagnosis):
+    page = linear_page(diagnosis)
+    units = units_of(page)
+    assert units["motor_angle_rad"] == "rad"
+    assert units["load_angle_rad"] == "m"
+    assert units["torque_constant_Nm_per_A"] == "Nm/A"
     assert all("Nm" not in law["y_label"] for law in page["laws"])
