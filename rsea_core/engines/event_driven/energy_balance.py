@@ -9,7 +9,7 @@ import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
-from rsea_core.effects.gear_transmission_error import array_angle_error
+from rsea_core.effects.gear_transmission_error import angle_error, array_angle_error
 from rsea_core.effects.registry import DriveThermal, Term
 from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
 from rsea_core.machine.spring_table import SpringTable, spring_energy_J
@@ -47,6 +47,15 @@ def contact_stored_J(fx, stiffness, depth):
     return stiffness * reference**2 * (depth / reference) ** (p + 1.0) / (p + 1.0)
 
 
+def _moved_load(plant, fx, motor, load, load_speed):
+    """Angle and speed with which a rigid train's load stores energy: without transmission error.
+
+    The log holds them with that error, whose torques the equations of motion neglect.
+    """
+    error, slope = angle_error.py_func(fx, motor, plant.gear_ratio)
+    return load - error, load_speed / (1.0 + slope)
+
+
 def energy_ledger(
     plant: mp.Plant, spring: SpringTable, fx: NDArray, log: NDArray, internal_states: NDArray
 ) -> EnergyLedger:
@@ -56,9 +65,8 @@ def energy_ledger(
         return read_only(np.ascontiguousarray(log[:, k.LOG_INTEGRALS + index]))
 
     current, motor, motor_speed, load, load_speed = log[:, : k.N_STATES].T
-    rigid = plant.structure == mp.RIGID_FREE
-    if rigid:  # its load is logged with a transmission error, whose torques no equation has
-        load, load_speed = motor, motor_speed
+    if plant.structure == mp.RIGID_FREE:
+        load, load_speed = _moved_load(plant, fx, motor, load, load_speed)
     winding = plant.inductance if plant.drive in (mp.DUTY, mp.VOLTAGE) else 0.0
     wheel, kinetic, stored, impact = motor, 0.0, stored_J(fx, motor, load), 0.0 * motor
     if internal_states.shape[0] > 0:
@@ -69,7 +77,7 @@ def energy_ledger(
             behind = fx[e.BACKLASH_INERTIA]
             kinetic = kinetic + 0.5 * behind * (internal_states[:, k.WB] ** 2 - motor_speed**2)
     deflection = wheel - load
-    if not rigid:
+    if plant.structure != mp.RIGID_FREE:
         deflection = deflection + array_angle_error(fx, wheel, plant.gear_ratio)
     if internal_states.shape[0] > 0:
         stored = stored + _remembered_J(fx, internal_states, deflection)

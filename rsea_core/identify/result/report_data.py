@@ -99,20 +99,16 @@ def report_data(
             "shares": {place: conclusion.residual.share},
             "traces": _unknown(conclusion.residual),
         }
-    if rig.axis != "linear":
-        return found
-    screw = (rig.gear_ratio or 1.0) != 1.0  # or a pinion: its motor turns
-    return _in_linear_units(found, ROTARY if screw else ())
+    return _in_linear_units(found, _rotary(rig)) if rig.axis == "linear" else found
+
+
+def _rotary(rig: Rig) -> tuple[str, ...]:
+    """First letters of the signals and values that keep radians: a screw's or pinion's motor."""
+    return ROTARY if (rig.gear_ratio or 1.0) != 1.0 else ()
 
 
 def _in_linear_units(page: Any, rotary: tuple[str, ...], key: str = "") -> Any:
-    """The page with metres and newtons as units, in labels of axes and in sentences on shapes.
-
-    Parameters
-    ----------
-    rotary : tuple of str
-        First letters of signals and values that keep radians.
-    """
+    """The page with metres and newtons as units, in labels of axes and in sentences on shapes."""
     if isinstance(page, dict):
         if str(page.get("signal") or page.get("name")).startswith(rotary):
             return page
