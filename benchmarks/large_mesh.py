@@ -20,8 +20,7 @@ def main() -> None:
     parser.add_argument("--layers", type=int, default=3)
     parser.add_argument("--threads", type=int, default=1, help="of the linear solver")
     arguments = parser.parse_args()
-    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = str(arguments.threads)  # read when the solver's library is loaded
+    os.environ["DFTFS_SOLVER_THREADS"] = str(arguments.threads)  # read with the solver's library
     from dftfs.analysis.torsion.contact_path import continued_in_contact, path_to_contact
     from dftfs.analysis.torsion.problem import meshed_problem
     from dftfs.design import MeshChoice, load_design

@@ -2,6 +2,7 @@
 
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.multistep.command_timing import CommandTiming
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
@@ -10,11 +11,13 @@ from rsea_core.recordings.recording import Recording
 from tests.cases.one_axis import axis_case, axis_rig
 
 
-def searched_axis(folder, *recordings: Recording) -> tuple[Found, Estimator, Estimate]:
+def searched_axis(
+    folder, *recordings: Recording, timing: CommandTiming | None = None
+) -> tuple[Found, Estimator, Estimate]:
     """Parameters alone by windows; whole recordings in the sensors' noise, and parameters there."""
     case = axis_case(folder, *recordings, rig=axis_rig())
     h = Hypothesis(laws=nuisances(case))
-    estimator, base, horizon = parameters_with_timing(case, h, lambda text: None)
+    estimator, base, horizon = parameters_with_timing(case, h, lambda text: None, timing=timing)
     found = Found(problem=estimator.problem, base_estimator=estimator, base=base,
                   estimator=estimator, best=base, horizon=horizon)  # fmt: skip
     own = in_sensor_noise(estimator)

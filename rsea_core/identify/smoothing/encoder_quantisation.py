@@ -25,9 +25,15 @@ def count_of(values: NDArray) -> float | None:
     if change.size < 3:
         return None
     smallest = float(np.percentile(change, 1.0))
-    whole = change / smallest
-    near = np.abs(whole - np.round(whole)) < 0.15
-    return smallest if near.mean() > 0.9 and np.unique(np.round(whole)).size < 400 else None
+    few = np.unique(np.round(change / smallest)).size < 400
+    return smallest if few and changes_by_counts(values, smallest) else None
+
+
+def changes_by_counts(values: NDArray, count: float) -> bool:
+    """Whether most changes between rows are whole multiples of a count, one at least."""
+    whole = np.abs(np.diff(values)) / count
+    whole = whole[whole > 0.5]
+    return whole.size >= 3 and np.mean(np.abs(whole - np.round(whole)) < 0.15) > 0.9
 
 
 def sharpened(reading: NDArray, count: float) -> tuple[NDArray, NDArray]:

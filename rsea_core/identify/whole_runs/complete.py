@@ -10,13 +10,15 @@ from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.search import begun, laws_of
 from rsea_core.identify.law_search.shape_search import shapes
-from rsea_core.identify.multistep.command_timing import CommandTiming, timings
+from rsea_core.identify.multistep.command_timing import timings
 from rsea_core.identify.multistep.criteria import (
     COMPLETE,
     COMPLETE_SHARE,
     EXPLAINED,
+    LEAST_EXCESS,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
+    NEARLY_EXPLAINED,
     PER_VALUE,
     RICHER_GAIN,
     SHAPE_SHARE,
@@ -28,12 +30,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
-from rsea_core.identify.whole_runs.search import (
-    Trial,
-    WholeSearch,
-    best_of_each_effect,
-    worth,
-)
+from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect, worth
 from rsea_core.identify.whole_runs.sensor_noise import (
     excess,
     in_noise_left_by,
@@ -42,6 +39,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     misfit,
     well_fitted,
 )
+from rsea_core.identify.whole_runs.taken_laws import Trial
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
 
@@ -79,19 +77,23 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         search.refine(say)
         search.compare(say)
         search.predict(say)
+        say(f"whole recordings: laws taken leave {search.excess():.0f} units more than noise")
+        if not found.sound and search.excess() >= LEAST_EXCESS:
+            other = _with_other_timing(search, say, least=NEARLY_EXPLAINED) if again else None
+            if other is not None and other[0].complete:
+                return other
+            if search.add_last(say):
+                search.compare(say, last=True)
+                search.predict(say)
         of_log = found.sound and _within_half_a_row(search)
         if not of_log and search.complete(say):
             return _complete(found, search), None
     if found.sound:  # an error that small is not evidence of a law that explains a part of it
         return found, None
     nearly = _nearly_complete(found, search, say)
-    timing = _other_timing(search) if again and search.taken else None
-    if timing is not None:
-        say("searched again: with laws of whole recordings, commands act at other times")
-        other = begun(found.problem.case, timing, say)
-        other, its_nearly = with_whole_runs(other, say, again=False)
-        if other.complete or (its_nearly is not None and nearly is None):
-            return other, its_nearly
+    other = _with_other_timing(search, say) if again and search.taken else None
+    if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
+        return other
     return found, nearly
 
 
@@ -132,18 +134,27 @@ def _within_half_a_row(search: WholeSearch) -> bool:
     return any(abs(delay_s) < 0.5 * row_s for delay_s in late)
 
 
-def _other_timing(search: WholeSearch) -> CommandTiming | None:
-    """Times of commands at which the laws taken predict clearly better; None where there are none.
+def _with_other_timing(
+    search: WholeSearch, say, least: float = 0.0
+) -> tuple[Found, Found | None] | None:
+    """The search (`with_whole_runs`) with commands at other times; None where it gains nothing.
 
     A drag that parameters lack can make a command that moves between its rows look held.
+
+    Parameters
+    ----------
+    least : float
+        Share of what the laws taken leave, that these times must explain.
     """
-    own, h = search.own, search.fit.hypothesis
-    least = max(search.doubt(), LEAST_OF_LEFT * search.plain_excess())
-    for timing in timings(own.problem.case, own.problem.timing):
-        problem = MultistepProblem(own.problem.case, timing=timing, steps=own.problem.steps)
-        other = with_best_delay(with_problem(own, problem), h, search.fit.x)
-        if other.cost < search.fit.cost - least:
-            return timing
+    own, h, case = search.own, search.fit.hypothesis, search.own.problem.case
+    least *= search.excess()
+    least = max(search.doubt(), least or LEAST_OF_LEFT * search.plain_excess())
+    for timing in timings(case, own.problem.timing):
+        problem = MultistepProblem(case, timing=timing, steps=own.problem.steps)
+        fit = with_best_delay(with_problem(own, problem), h, search.fit.x)
+        if fit.cost < search.fit.cost - least:
+            say("searched again: with laws of whole recordings, commands act at other times")
+            return with_whole_runs(begun(case, timing, say), say, again=False)
     return None
 
 

@@ -17,6 +17,7 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import (
     LEAST_GAIN,
+    NEGLIGIBLE_FALL,
     SCANS,
     SENSOR_COLOUR_ROWS,
     SENSORS_ALONE,
@@ -25,15 +26,18 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import with_windows
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.tracks import Track, prepared
+from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_by_counts, count_of
 
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
-MOVES = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
+SIZES = np.geomspace(0.05, 6.0, 28)  # moves of a value, in tolerances
+MOVES = np.concatenate([-SIZES[::-1], [0.0], SIZES])
 
 
 def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estimator:
     """Another estimator, of whole recordings, with the readings' noise and hardly any torques'.
 
-    Errors that last over many rows are the model's: a sensor's colour is its filter's.
+    Errors that last over many rows are the model's: a sensor's colour is its filter's. Beside an
+    unknown torque that follows each count the noise of an encoder is estimated too small.
 
     Parameters
     ----------
@@ -48,12 +52,24 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
         noise, readings = t.noise, t.noise.readings
         if _of_sensor(t):
             readings = np.hypot(readings, noise.colours)
+        readings = np.maximum(readings, _quantisation(t))
         inputs, colours = SENSORS_ALONE * noise.inputs, 0.0 * noise.colours
         noise = replace(noise, inputs=inputs, readings=readings, colours=colours)
         tracks.append(prepared(t, noise=noise))
     own = estimator.having(tracks)
     own.tempering = 1.0
     return own
+
+
+def _quantisation(t: Track) -> NDArray:
+    """Standard deviations (p,) of averaged readings by their counts alone; 0 without counts."""
+    e = t.experiment
+    found = np.zeros(len(e.channels))
+    for j, (column, floor) in enumerate(zip(e.measured.T, e.floor_of_each, strict=True)):
+        count = floor / UNIFORM**0.5  # where the file states counts, of these
+        count = count if changes_by_counts(column, count) else count_of(column) or 0.0
+        found[j] = count * (UNIFORM / t.block) ** 0.5
+    return found
 
 
 def _of_sensor(t: Track) -> bool:
@@ -116,16 +132,27 @@ def well_fitted(own: Estimator, fit: Estimate) -> Estimate:
     """
     h, count = fit.hypothesis, len(own.problem.nominals)
     for _ in range(SCANS):
-        moves = np.kron(np.eye(count, fit.x.size), np.concatenate([-MOVES, MOVES])[:, None])
+        moves = np.kron(np.eye(count, fit.x.size), MOVES[:, None])
         costs = np.array(own.costs([(h, fit.x + move) for move in moves])).reshape(count, -1)
-        costs = np.where(np.isfinite(costs), costs, np.inf)
-        near = np.argsort(costs.min(axis=1))[:SCANS]
-        best = [moves[j * costs.shape[1] + int(np.argmin(costs[j]))] for j in near]
-        other = min((own.fit(h, fit.x + b, iterations=12) for b in best), key=lambda f: f.cost)
-        if not other.cost < fit.cost - LEAST_GAIN:
+        lowest = _minima(np.where(np.isfinite(costs), costs, np.inf))
+        starts = [fit.x + moves[k] for k in lowest[:SCANS]] or [fit.x]
+        other = min((own.fit(h, x, iterations=12) for x in starts), key=lambda f: f.cost)
+        fall = fit.cost - other.cost
+        fit = other if fall > 0.0 else fit
+        if fall < max(LEAST_GAIN, NEGLIGIBLE_FALL * abs(fit.cost)):
             break
-        fit = other
     return fit
+
+
+def _minima(costs: NDArray) -> NDArray:
+    """Places of the minima in rows of costs (n, k) but those of the fit itself, the lowest first.
+
+    The middle column is the fit; a row without another minimum leads back to it.
+    """
+    inner = (costs[:, 1:-1] < costs[:, :-2]) & (costs[:, 1:-1] <= costs[:, 2:])
+    inner[:, costs.shape[1] // 2 - 1] = False
+    places = np.flatnonzero(np.pad(inner, ((0, 0), (1, 1))))
+    return places[np.argsort(costs.ravel()[places])]
 
 
 def misfit(own: Estimator, h: Hypothesis, x: NDArray) -> float:

@@ -16,8 +16,9 @@ from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.whole_runs.forms import alike, holds
-from rsea_core.identify.whole_runs.search import Trial, WholeSearch
+from rsea_core.identify.whole_runs.search import WholeSearch
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit
+from rsea_core.identify.whole_runs.taken_laws import Trial
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 AMPLITUDE_Nm, HARMONIC_Nm = 0.004, 0.002

@@ -17,8 +17,9 @@ from rsea_core.identify.multistep.horizons import parameters_with_timing, with_f
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
-from rsea_core.identify.whole_runs.search import Trial, worth
+from rsea_core.identify.whole_runs.search import worth
 from rsea_core.identify.whole_runs.sensor_noise import in_noise_left_by, in_sensor_noise, misfit
+from rsea_core.identify.whole_runs.taken_laws import Trial
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 

@@ -1,0 +1,45 @@
+"""A law that is small beside another one is found if it explains what that one leaves."""
+
+import pytest
+
+from rsea_core.effects.load_friction import LoadFriction
+from rsea_core.effects.spring_parallel import SpringParallel
+from rsea_core.identify.law_search.search import laws_of
+from rsea_core.identify.multistep.command_timing import AS_LOGGED
+from rsea_core.identify.multistep.criteria import LEAST_EXCESS, LEAST_OF_LEFT
+from rsea_core.identify.whole_runs.search import WholeSearch
+from tests.cases.one_axis import axis_recording
+from tests.cases.whole_runs import searched_axis
+
+SPRING, FRICTION = "spring-parallel/linear", "load-friction/coulomb"
+STIFF = SpringParallel(stiffness_Nm_per_rad=0.01)
+SMALL = LoadFriction(coulomb_Nm=0.001)
+
+
+def sprung(folder, *terms) -> WholeSearch:
+    """A search that took the spring of an axis."""
+    found, own, plain = searched_axis(folder, axis_recording(*terms, seed=1), timing=AS_LOGGED)
+    laws = [law for law in laws_of(found) if law.key in (SPRING, FRICTION)]
+    search = WholeSearch(own, plain, found, laws, 0.0)
+    assert search.add(lambda text: None)
+    assert [law.key for law in search.taken] == [SPRING]
+    return search
+
+
+@pytest.fixture(scope="module")
+def with_friction(tmp_path_factory):
+    """A search that took the larger of two laws, and what was left then."""
+    search = sprung(tmp_path_factory.mktemp("two"), STIFF, SMALL)
+    return search, search.excess()
+
+
+def test_a_small_law_that_explains_what_a_large_one_leaves_is_taken(with_friction):
+    search, left = with_friction
+    assert LEAST_EXCESS < left < LEAST_OF_LEFT * search.plain_excess()
+    assert search.add_last(lambda text: None)
+    assert [law.key for law in search.taken] == [SPRING, FRICTION]
+    assert search.excess() < 0.15 * left
+
+
+def test_no_law_is_taken_where_one_leaves_noise_alone(tmp_path):
+    assert not sprung(tmp_path, STIFF).add_last(lambda text: None)
