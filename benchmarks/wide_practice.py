@@ -34,7 +34,8 @@ def run_case(folder: Path, out: Path) -> str:
         path = target / "model.toml"
         path.write_text(model_toml, encoding="utf-8")
         model = FoundModel.from_toml(path)
-        for test in read_test(folder / "test", model.rig):
+        tests = read_test(folder / "test", model.rig) if (folder / "test").is_dir() else ()
+        for test in tests:
             write_prediction(model, test, target / "prediction.csv")
     except RseaError as refused:
         return f"{folder.name}: {refused}"
