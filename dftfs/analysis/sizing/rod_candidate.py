@@ -125,7 +125,7 @@ def assess_values(
             missing = (task.process.gap_m - gap) / spiral.thickness_m
             violation = len(STAGES) - 1 + missing / (1 + missing)
             return Candidate(**known, violation=violation, limits=(), why="coils too close")
-        outline = build_outline(spiral)
+        outline = build_outline(spiral, advise=False)
         arm = arm_rod(
             outline,
             _UNIT_WIDTH_m,
