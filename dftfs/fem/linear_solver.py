@@ -139,7 +139,7 @@ class _PardisoHandle:
             self._call(self._RELEASE, self._none, self._none)
             self._analysed = False
             if self._n >= BLOCKS_FROM:
-                _return_free_memory()
+                _trim_heap()
 
     def _call(self, phase: int, right: NDArray, solution: NDArray) -> int:
         def integer(value: int):
@@ -250,7 +250,7 @@ def solver_threads() -> int:
     return int(given)
 
 
-def _return_free_memory() -> None:
+def _trim_heap() -> None:
     """Give back to the system what the C library keeps of freed memory (glibc only)."""
     with suppress(AttributeError, OSError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)

@@ -82,8 +82,7 @@ def solve_path(
     step_callback : function of a state, or None
         Called after every converged increment; True ends the path there.
     guess : function of a state and t, or None
-        Displacements at t, the state being the last one, tried before the extrapolation of the
-        states; None where nothing better is known. They are a start only.
+        A start at t from the last state, tried before the states' extrapolation, or None.
 
     Raises
     ------

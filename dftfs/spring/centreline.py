@@ -134,7 +134,7 @@ class Spiral(ABC):
         tangent = self.tangent(theta)
         return _pairs(tangent[..., 1], -tangent[..., 0])
 
-    def point_beside(self, theta: ArrayLike, offset_m: float) -> NDArray:
+    def offset_point(self, theta: ArrayLike, offset_m: float) -> NDArray:
         """Points at a signed distance along the normal, shape (..., 2), in m."""
         radius, slope, radial, around = self._frame(theta)
         tangent = slope[..., None] * radial + radius[..., None] * around

@@ -29,7 +29,7 @@ _LEAST_REACH = 0.75  # steps of the grid: narrower regions hold nothing but thei
 _FURTHEST = 4.0  # reaches from the centre to a candidate that a model may use
 _MOST_USED = 160
 _DAMPING = 0.03  # of second derivatives, against the fit's residuals
-_DOUBTS = (0.0, 1.0, -1.0)  # fit's errors that are kept to a limit
+_RESERVES = (0.0, 1.0, -1.0)  # fit's errors that are kept to a limit
 _POINTS_EACH = 4  # of the grid, of each minimum
 _AT_RANDOM = 4  # in the region, so that the next fit knows all of it
 _ROUNDS = 14
@@ -64,7 +64,7 @@ class Quadratics:
         """Values (..., m) at points (..., n)."""
         return _terms(z) @ self.numbers
 
-    def slopes(self, z: NDArray) -> NDArray:
+    def jacobian(self, z: NDArray) -> NDArray:
         """Derivatives (n, m) at a point (n,)."""
         n = len(z)
         found = np.empty((n, self.numbers.shape[1]))
@@ -156,7 +156,7 @@ def _apart(archive: Archive, regions: Sequence[Region]) -> list[Region]:
 
 
 def _promised(archive: Archive, region: Region, rng: np.random.Generator) -> list[tuple[int, ...]]:
-    """Numbers of the grid that are worth judging next, none of them judged before."""
+    """Numbers of the grid to evaluate next, none of them known."""
     task, free = archive.task, _free(archive.task)
     centre = np.array(region.centre.index, dtype=float)[free]
     low = np.maximum(-centre, -region.reach) / region.reach
@@ -172,10 +172,10 @@ def _promised(archive: Archive, region: Region, rng: np.random.Generator) -> lis
         if tuple(index) not in archive.known:
             found[tuple(index)] = None
 
-    for doubt in _DOUBTS if models is not None else ():
-        z = _least(models, low, high, doubt)
+    for reserve in _RESERVES if models is not None else ():
+        z = _least(models, low, high, reserve)
         around = _grid_points(z, centre, region.reach, low, high)
-        ranked = _ranking(models, around, doubt)
+        ranked = _ranking(models, around, reserve)
         for point in around[ranked[:_POINTS_EACH]]:
             add(point)
     count = _AT_RANDOM if models is not None else 2 * _AT_RANDOM
@@ -271,19 +271,19 @@ def _terms(z: NDArray) -> NDArray:
     return np.stack([np.ones(z.shape[:-1]), *np.moveaxis(z, -1, 0), *pairs], axis=-1)
 
 
-def _least(models: Quadratics, low: NDArray, high: NDArray, doubt: float) -> NDArray:
+def _least(models: Quadratics, low: NDArray, high: NDArray, reserve: float) -> NDArray:
     """The objective's least value inside a box where all margins are kept, by the models."""
-    kept = doubt * models.errors[1:]
+    kept = reserve * models.errors[1:]
     unit = max(models.errors[0], 1e-9 * abs(models.numbers[0, 0]), 1e-12)
     found = minimize(
         lambda z: models.values(z)[0] / unit,
         np.zeros(len(low)),
-        jac=lambda z: models.slopes(z)[:, 0] / unit,
+        jac=lambda z: models.jacobian(z)[:, 0] / unit,
         bounds=list(zip(low, high)),
         constraints={
             "type": "ineq",
             "fun": lambda z: models.values(z)[1:] - kept,
-            "jac": lambda z: models.slopes(z)[:, 1:].T,
+            "jac": lambda z: models.jacobian(z)[:, 1:].T,
         },
         method="SLSQP",
         options={"maxiter": 60, "ftol": 1e-7},
@@ -302,8 +302,8 @@ def _grid_points(
     return points[inside] if inside.any() else points
 
 
-def _ranking(models: Quadratics, points: NDArray, doubt: float) -> NDArray:
+def _ranking(models: Quadratics, points: NDArray, reserve: float) -> NDArray:
     """Places of points from the best on: by shortfall, then by the objective."""
     values = models.values(points)
-    short = np.sum(np.maximum(doubt * models.errors[1:] - values[:, 1:], 0.0), axis=1)
+    short = np.sum(np.maximum(reserve * models.errors[1:] - values[:, 1:], 0.0), axis=1)
     return np.lexsort((values[:, 0], short))
