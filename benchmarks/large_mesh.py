@@ -1,6 +1,6 @@
 """Half a million unknowns with contact: time and memory of `al1` unwinding past its first contact.
 
-    python benchmarks/large_mesh.py --size 0.3 --layers 3 [--threads 2]
+    python benchmarks/large_mesh.py --size 0.34 --layers 6 [--threads 2]
 
 3D, one sector and half of the width as `dftfs verify` solves it, by the coarse mesh's first
 contact: to 0.95 of it, the onset, then 1.05 and 1.10 of it in contact. Printed: unknowns, torque at
@@ -16,11 +16,11 @@ from resource import RUSAGE_SELF, getrusage
 def main() -> None:
     """Solve and print one line a phase."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--size", type=float, default=0.3)
-    parser.add_argument("--layers", type=int, default=3)
+    parser.add_argument("--size", type=float, default=0.34)
+    parser.add_argument("--layers", type=int, default=6)
     parser.add_argument("--threads", type=int, default=1, help="of the linear solver")
     arguments = parser.parse_args()
-    os.environ["DFTFS_SOLVER_THREADS"] = str(arguments.threads)  # read with the solver's library
+    os.environ["DFTFS_SOLVER_THREADS"] = str(arguments.threads)  # read when the library is loaded
     from dftfs.analysis.torsion.contact_path import continued_in_contact, path_to_contact
     from dftfs.analysis.torsion.problem import meshed_problem
     from dftfs.design import MeshChoice, load_design

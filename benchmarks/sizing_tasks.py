@@ -1,9 +1,10 @@
 """The sizing's search against 20,000 rod evaluations of plain differential evolution.
 
 `python -m benchmarks.sizing_tasks` runs four tasks that can be met and two that cannot, each by one
-call as `dftfs size` makes it (finite elements left out); `--brute-force` adds the comparison, some
-minutes for each task. Both search the same grids with the same judge; the brute force knows no
-zooming, no pattern search and no screened first population.
+call as `dftfs size` makes it (finite elements left out); `--further` runs four others, for which
+the search was not chosen; `--brute-force` adds the comparison, some minutes for
+each task. Both search the same grids with the same judge; the brute force knows no zooming, no
+local models, no pattern search and no screened first population.
 """
 
 import argparse
@@ -12,9 +13,10 @@ import time
 import numpy as np
 from scipy.optimize import differential_evolution
 
+from dftfs.analysis.sizing.archive import Archive
 from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.relaxation import relaxations
-from dftfs.analysis.sizing.search import Archive, Sizing, size
+from dftfs.analysis.sizing.search import Sizing, size
 from dftfs.analysis.sizing.task import SizingTask, load_task
 
 SMALL = {"stiffness_Nm_per_rad": "40", "envelope_mm": "110", "material": "17-4PH"}
@@ -38,6 +40,41 @@ TASKS = {
         "envelope_mm": "200",
         "material": "17-4PH",
         "process": "milling",
+    },
+}
+# as many again of other stiffness, envelope, material, process and requirements
+FURTHER = {
+    "20 Nm/rad, 8 Nm, 120 mm, Ti-6Al-4V, water jet, 1e5 cycles": {
+        "stiffness_Nm_per_rad": "20",
+        "contact_free_torque_Nm": "8",
+        "envelope_mm": "120",
+        "material": "Ti-6Al-4V",
+        "process": "water-jet",
+        "life_cycles": "1e5",
+    },
+    "120 Nm/rad, 25 Nm, 140 mm, 17-4PH, wire EDM, 3 arms, 1e6 cycles": {
+        "stiffness_Nm_per_rad": "120",
+        "contact_free_torque_Nm": "25",
+        "envelope_mm": "140",
+        "material": "17-4PH",
+        "n_arms": "3",
+        "life_cycles": "1e6",
+    },
+    "500 Nm/rad, 120 Nm, 300 mm, 17-4PH or Ti-6Al-4V, milling, 2 to 4 arms, taper": {
+        "stiffness_Nm_per_rad": "500",
+        "contact_free_torque_Nm": "120",
+        "envelope_mm": "300",
+        "material": "17-4PH, Ti-6Al-4V",
+        "process": "milling",
+        "n_arms": "2:4:1",
+        "taper": "0.8:1.2:0.02",
+    },
+    "25 Nm/rad, 6 Nm, 160 mm, 7075-T6, milling, 1e5 cycles": {
+        "stiffness_Nm_per_rad": "25",
+        "contact_free_torque_Nm": "6",
+        "envelope_mm": "160",
+        "process": "milling",
+        "life_cycles": "1e5",
     },
 }
 INFEASIBLE = {
@@ -86,11 +123,13 @@ def main() -> None:
     """Print a line for each task."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--brute-force", action="store_true")
+    parser.add_argument("--further", action="store_true", help="four other tasks instead")
     parser.add_argument("--only", type=int, help="number of one task, from 0")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2)
     arguments = parser.parse_args()
-    for number, (name, changes) in enumerate((TASKS | INFEASIBLE).items()):
+    tasks = FURTHER if arguments.further else TASKS | INFEASIBLE
+    for number, (name, changes) in enumerate(tasks.items()):
         if arguments.only not in (None, number):
             continue
         task = load_task("default", changes)

@@ -5,11 +5,12 @@ import time
 from functools import partial
 
 from dftfs.analysis.jobs.store import user_store
+from dftfs.analysis.sizing.archive import Archive
 from dftfs.analysis.sizing.comparison import compare
 from dftfs.analysis.sizing.fe_confirmation import Confirmed, confirm
 from dftfs.analysis.sizing.pool import judge_pool
 from dftfs.analysis.sizing.relaxation import Relaxation, relaxations
-from dftfs.analysis.sizing.search import Archive, Sizing, size
+from dftfs.analysis.sizing.search import Sizing, size
 from dftfs.analysis.sizing.task import SizingTask, built_in_tasks, load_task
 from dftfs.cli.common import add_changes, add_output, add_work, changes, emit, progress
 from dftfs.cli.output import default_folder, write_result

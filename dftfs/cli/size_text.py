@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 
+from dftfs.analysis.sizing.archive import Archive
 from dftfs.analysis.sizing.comparison import Comparison
 from dftfs.analysis.sizing.relaxation import Relaxation
-from dftfs.analysis.sizing.search import Archive, Sizing
+from dftfs.analysis.sizing.search import Sizing
 from dftfs.analysis.sizing.task import SizingTask
 from dftfs.cli.common import table
 

@@ -200,6 +200,7 @@ class ElasticBody:
     def couple(self, nodes: NDArray[np.int32] | None) -> None:
         """Make the pattern anew with further groups of coupled nodes (k, r), zero-filled."""
         dofs = self._dofs
+        self.pattern = self.stiffness = self.target = None  # not two of each at a time
         self.pattern = pattern = symmetric_pattern(self._domain.cells, dofs, nodes)
         self.stiffness = np.zeros(len(pattern.indices))
         self.target = Target(

@@ -1,5 +1,6 @@
 """An elastic body whose surfaces may touch: one answer to forces and tangent for both."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,6 +33,7 @@ class ContactingBody:
 
     def __init__(self, body: ElasticBody, contact: ContactBody) -> None:
         self._body, self.contact = body, contact
+        self.before_growth: Callable[[], None] = lambda: None  # called while the old pattern lives
 
     @property
     def pattern(self):
@@ -57,6 +59,7 @@ class ContactingBody:
         """Forces, K in ``stiffness``, and the nodal product K ``direction``."""
         couples = self.contact.new_couples(u)
         if couples is not None:
+            self.before_growth()
             self._body.couple(couples)
         evaluation, product = self._body.tangent(u, direction)
         if evaluation.status != STATUS_OK:

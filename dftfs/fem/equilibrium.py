@@ -80,17 +80,22 @@ class Equilibrium:
             raise SolveError(f"no equilibrium at t=0: {state.reason}; is the body supported?")
         return state
 
-    def advance(self, states: Sequence[PathState], t: float) -> PathState | Failure:
-        """The state at t, from the states before it (the last few are used)."""
+    def advance(
+        self, states: Sequence[PathState], t: float, guess: NDArray | None = None
+    ) -> PathState | Failure:
+        """The state at t, from a guess of it or the states before (the last few are used)."""
         self._iterations = self._linear.factorisations = 0
         target = self._problem.prescribed(t)[0]
         last, pressed = states[-1].displacement_m, states[-1].pressed  # no smooth path over a knee
         end: NDArray | Failure | None = None
-        predicted = extrapolated(
-            [(s.t, s.displacement_m, s.rate_m) for s in states[-3:] if s.pressed == pressed], t
-        )
-        if predicted is not None:
-            end = self._corrected(t, self._dofs.satisfied(predicted, target))
+        if guess is not None:
+            end = self._corrected(t, self._dofs.satisfied(guess, target))
+        if end is None or isinstance(end, Failure):
+            predicted = extrapolated(
+                [(s.t, s.displacement_m, s.rate_m) for s in states[-3:] if s.pressed == pressed], t
+            )
+            if predicted is not None:
+                end = self._corrected(t, self._dofs.satisfied(predicted, target))
         if end is None or isinstance(end, Failure):
             gap = target - self._problem.prescribed(states[-1].t)[0]
             end = self._corrected(t, last, gap)

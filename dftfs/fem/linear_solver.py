@@ -10,6 +10,7 @@ import importlib.metadata
 import importlib.util
 import os
 import weakref
+from contextlib import suppress
 from typing import Protocol
 
 import numpy as np
@@ -54,8 +55,8 @@ class PardisoSolver:
     Without iterative refinement; the same number of threads gives the same bits.
 
     Cholesky until a tangent is not positive definite, from then on LDL^T with pivoting. Large
-    matrices are kept as blocks of a node's unknowns inside: a third less memory, half as long
-    again.
+    matrices are kept as blocks of a node's unknowns inside: less memory, longer (of 155,000
+    unknowns a fifth less, a third longer).
     """
 
     name = "pardiso"
@@ -88,7 +89,7 @@ class PardisoSolver:
 class _PardisoHandle:
     """PARDISO's memory for one sparsity pattern, and calls of its phases."""
 
-    _ANALYSE, _FACTOR, _SOLVE, _RELEASE = 11, 22, 33, -1
+    _ANALYSE, _FACTOR, _SOLVE, _RELEASE_FACTORS, _RELEASE = 11, 22, 33, 0, -1
     _POSITIVE_DEFINITE, _INDEFINITE = 2, -2
 
     def __init__(
@@ -116,6 +117,8 @@ class _PardisoHandle:
             if self._call(self._ANALYSE, self._none, self._none) != 0:
                 raise SolveError(f"PARDISO could not analyse a matrix of {self._n} unknowns")
             self._analysed = True
+        elif self._n >= BLOCKS_FROM:  # else the matrix is copied into blocks beside old factors
+            self._call(self._RELEASE_FACTORS, self._none, self._none)
         error = self._call(self._FACTOR, self._none, self._none)
         if error != 0 and self._kind == self._POSITIVE_DEFINITE:
             self.release()
@@ -135,6 +138,8 @@ class _PardisoHandle:
         if self._analysed:
             self._call(self._RELEASE, self._none, self._none)
             self._analysed = False
+            if self._n >= BLOCKS_FROM:
+                _trim_heap()
 
     def _call(self, phase: int, right: NDArray, solution: NDArray) -> int:
         def integer(value: int):
@@ -243,6 +248,12 @@ def solver_threads() -> int:
     if not (given.isdecimal() and 1 <= int(given) <= _MOST_THREADS):
         raise SolveError(f"{_THREADS}={given!r} must be 1 to {_MOST_THREADS}, e.g. {_THREADS}=2")
     return int(given)
+
+
+def _trim_heap() -> None:
+    """Give back to the system what the C library keeps of freed memory (glibc only)."""
+    with suppress(AttributeError, OSError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
 
 
 def _pardiso_installed() -> bool:

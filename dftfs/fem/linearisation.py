@@ -71,10 +71,18 @@ class Linearisation:
         self.factorisations = 0
         self._force_scale = self._energy_scale = 0.0
         self._factored: NDArray | None = None  # the very array u whose tangent is factored
+        if isinstance(body, ContactingBody):
+            body.before_growth = self._release
 
     def close(self) -> None:
         """Free the factors."""
-        self._solver.close()
+        if self._solver is not None:
+            self._solver.close()
+
+    def _release(self) -> None:
+        """Let go of factors and pattern: the next tangent has another one."""
+        self.close()
+        self._solver = self._pattern = self._factored = None
 
     @property
     def negative_pivots(self) -> int:
@@ -112,7 +120,6 @@ class Linearisation:
         self.factorisations += 1
         if self._pattern is not self._body.pattern:  # other facets have met: it has grown
             self._pattern = self._body.pattern
-            self._solver.close()
             self._solver = make_solver(
                 self._pattern.indptr, self._pattern.indices, prefer=self._prefer
             )

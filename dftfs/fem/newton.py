@@ -17,6 +17,8 @@ from dftfs.fem.problem import StaticProblem
 
 __all__ = ["PathResult", "PathState", "StaticProblem", "linear_tangent", "solve_path"]
 
+Guess = Callable[[PathState, float], np.ndarray | None]
+
 _TOLERANCE, _ITERATIONS = 1e-9, 30
 _SMALLEST_STEP = 1e-4  # of the way to the next target
 
@@ -59,6 +61,7 @@ def solve_path(
     solver: str = "auto",
     on_progress: Callable[[PathState], None] | None = None,
     step_callback: Callable[[PathState], bool] | None = None,
+    guess: Guess | None = None,
 ) -> PathResult:
     """Follow the equilibrium from the undeformed body at t = 0 through the targets.
 
@@ -78,6 +81,8 @@ def solve_path(
     on_progress : function of a state, or None
     step_callback : function of a state, or None
         Called after every converged increment; True ends the path there.
+    guess : function of a state and t, or None
+        A start at t from the last state, tried before the states' extrapolation, or None.
 
     Raises
     ------
@@ -94,7 +99,7 @@ def solve_path(
         equilibrium.resume(states[-1])
         for goal in goals:
             while states[-1].t != goal and not stopped:
-                state, step = _one_increment(equilibrium, states, goal, step)
+                state, step = _one_increment(equilibrium, states, goal, step, guess)
                 if abs(state.t - states[-1].t) >= 0.999 * step:  # not cut short by the goal
                     step = min(_next_step(step, state), largest)
                 states.append(state)
@@ -129,12 +134,16 @@ def _equilibrium(
 
 
 def _one_increment(
-    equilibrium: Equilibrium, states: list[PathState], goal: float, step: float
+    equilibrium: Equilibrium,
+    states: list[PathState],
+    goal: float,
+    step: float,
+    guess: Guess | None,
 ) -> tuple[PathState, float]:
     here = states[-1].t
     while True:
         t = goal if abs(goal - here) <= step else float(here + np.copysign(step, goal - here))
-        end = equilibrium.advance(states, t)
+        end = equilibrium.advance(states, t, None if guess is None else guess(states[-1], t))
         if isinstance(end, PathState):
             return end, step
         step = abs(t - here) / 2

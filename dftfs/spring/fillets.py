@@ -56,7 +56,7 @@ def arc_between(name: str, centre: NDArray, start: NDArray, end: NDArray, sense:
 
 
 def _parallel(p: SpiralParameters, theta: float, offset_m: float) -> NDArray:
-    return p.centreline.point(theta) + offset_m * p.centreline.normal(theta)
+    return p.centreline.offset_point(theta, offset_m)
 
 
 def _distance(p: SpiralParameters, theta: float, offset_m: float) -> float:

@@ -90,8 +90,14 @@ class SpringOutline:
         return {**by_name, "rim_outer": self.rim_outer, "bore": self.bore}[name]
 
 
-def build_outline(parameters: SpiralParameters) -> SpringOutline:
+def build_outline(parameters: SpiralParameters, *, advise: bool = True) -> SpringOutline:
     """Solve for the fillets and tips and assemble the outline.
+
+    Parameters
+    ----------
+    advise : bool
+        Whether the message for fillets that do not fit says which would; to find that out takes
+        ten times as long as the outline.
 
     Raises
     ------
@@ -103,9 +109,9 @@ def build_outline(parameters: SpiralParameters) -> SpringOutline:
     _check_strip(p)
     foot, notch = hub_fillet(p, side=+1), hub_fillet(p, side=-1)
     slit, tip = slit_fillet(p), arm_tip(p)
-    _check_arm(p, foot, notch, slit, tip)
+    _check_arm(p, foot, notch, slit, tip, advise)
     _check_arms_apart(p, foot)
-    floor, ceiling, hub, rim = _coil_gap_edges(p, foot, notch, slit, tip)
+    floor, ceiling, hub, rim = _coil_gap_edges(p, foot, notch, slit, tip, advise)
     gaps = []
     for k in range(p.n_arms):
         turn = k * p.pitch_rad
@@ -138,7 +144,7 @@ def _circle(name: str, radius_m: float, sense: int) -> Arc:
 
 
 def _coil_gap_edges(
-    p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip
+    p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip, advise: bool
 ) -> tuple[list[Edge], list[Edge], Arc, Arc]:
     """Coil gap 0: its floor (of the next arm, not yet turned), its ceiling, hub arc and rim arc."""
     line, half = p.centreline, p.thickness_m / 2
@@ -147,8 +153,8 @@ def _coil_gap_edges(
     inner = OffsetEdge(name="arm_inner", **shape, offset_m=-half, start=tip.theta, end=notch.theta)
     hub_start, rim_end = polar(notch.ring_point_m), polar(tip.ring_point_m)
     hub_sweep, rim_sweep = _ring_sweeps(p, foot, notch, slit, tip)
-    _check_ring_arc(p, hub_sweep, p.hub_radius_m, "hub", "notch")
-    _check_ring_arc(p, rim_sweep, p.rim_inner_radius_m, "rim", "slit")
+    _check_ring_arc(p, hub_sweep, p.hub_radius_m, "hub", "notch", advise)
+    _check_ring_arc(p, rim_sweep, p.rim_inner_radius_m, "rim", "slit", advise)
     hub = Arc(
         name="hub",
         centre_m=(0.0, 0.0),
@@ -206,7 +212,7 @@ def _largest_fitting(p: SpiralParameters, name: str) -> str:
 
 
 def _check_ring_arc(
-    p: SpiralParameters, sweep: float, radius_m: float, ring: str, end: str
+    p: SpiralParameters, sweep: float, radius_m: float, ring: str, end: str, advise: bool
 ) -> None:
     """A free arc of a ring must lie inside one pitch, or its two fillets have crossed."""
     if 0 < sweep < p.pitch_rad:
@@ -216,7 +222,7 @@ def _check_ring_arc(
     raise DesignError(
         f"{p.text('fillet_radius_m')} does not fit: at the {ring} the {end} fillet runs"
         f" {crossed * radius_m * 1e3:.3g} mm past the next arm's;"
-        f" {_largest_fitting(p, 'fillet_radius_m')}{fewer} would work"
+        f" {_largest_fitting(p, 'fillet_radius_m') if advise else ''}{fewer} would work"
     )
 
 
@@ -233,11 +239,13 @@ def _check_strip(p: SpiralParameters) -> None:
         )
 
 
-def _check_arm(p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip) -> None:
+def _check_arm(
+    p: SpiralParameters, foot: Fillet, notch: Fillet, slit: Fillet, tip: Tip, advise: bool
+) -> None:
     if max(foot.theta, notch.theta) >= min(slit.theta, tip.theta):
         raise DesignError(
             f"{p.text('turns')}: nothing of the arm is left between its fillets;"
-            f" {_largest_fitting(p, 'hub_radius_m')}more turns would work"
+            f" {_largest_fitting(p, 'hub_radius_m') if advise else ''}more turns would work"
         )
     if p.taper is None:
         return

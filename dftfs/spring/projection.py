@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 _CONE = 0.7  # cosine between normal and foot's direction: within 45 degrees of the normal
 _FACING = -0.5  # product of the two normals: within 60 degrees of opposed
+_WIDER = 1 + 1e-9  # on half a segment's length, for round-off
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,12 +71,22 @@ def project(
 def _nearest(points, normals, polyline, other, deepest):
     n, m = len(points), len(polyline) - 1
     gap, foot, segment = np.full(n, np.inf), np.full((n, 2), np.nan), np.full(n, -1)
+    middle, half = np.empty((m, 2)), np.empty(m)
+    for k in range(m):
+        dx, dy = polyline[k + 1, 0] - polyline[k, 0], polyline[k + 1, 1] - polyline[k, 1]
+        middle[k, 0], middle[k, 1] = polyline[k, 0] + dx / 2, polyline[k, 1] + dy / 2
+        half[k] = _WIDER * np.hypot(dx, dy) / 2
     for i in range(n):
         # distances: to any segment, and to those that face the point, outside and inside
         nearest, ahead, behind = np.inf, np.inf, np.inf
         at_ahead, at_behind = -1, -1
         for k in range(m):
             facing = normals[i, 0] * other[k, 0] + normals[i, 1] * other[k, 1] < _FACING
+            # too far away to change anything: most segments
+            reach = max(ahead, min(behind, deepest)) if facing else nearest
+            mx, my = middle[k, 0] - points[i, 0], middle[k, 1] - points[i, 1]
+            if mx * mx + my * my > (reach + half[k]) ** 2:
+                continue
             inside, tx, ty = _foot(points[i], polyline, k)
             if not inside:
                 continue  # beyond the polyline's ends nothing is known

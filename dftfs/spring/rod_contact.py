@@ -107,17 +107,24 @@ def deformed_coil_gap(
     pitch = arm.outline.parameters.pitch_rad
     # the floor is of the next arm: seen from there it is arm 0, and its hub stands
     floor = rotate(samples.floor_m, -pitch)
-    floor = rotate(carried_points(arm, floor, samples.floor_theta, -np.inf, state), pitch)
+    motion = section_motion(arm, state)
+    floor = carried_points(arm, floor, samples.floor_theta, -np.inf, motion)
     # the tip belongs to the arm, as far as the neck behind it lets the arm turn on its own
     tip = np.isin(samples.ceiling_kind, _TIP)
     theta = np.where(tip, arm.outline.feet.tip_theta, samples.ceiling_theta)
-    return floor, carried_points(arm, samples.ceiling_m, theta, np.inf, state)
+    return rotate(floor, pitch), carried_points(arm, samples.ceiling_m, theta, np.inf, motion)
+
+
+def section_motion(arm: ArmRod, state: RodState) -> CubicSpline:
+    """Places before and after (2 each) and turn of a state's sections over their arc length."""
+    motion = np.column_stack([arm.rod.nodes_m, state.nodes_m, state.rotation_rad])
+    return CubicSpline(arm.arc_m, motion)
 
 
 def carried_points(
-    arm: ArmRod, points: NDArray, theta: NDArray, otherwise: float, state: RodState
+    arm: ArmRod, points: NDArray, theta: NDArray, otherwise: float, motion: CubicSpline
 ) -> NDArray:
-    """Points (n, 2) of arm 0 moved with the section at their arc length in a state of the rod.
+    """Points (n, 2) of arm 0 moved with the section at their arc length (`section_motion`).
 
     ``theta`` (n,): their centreline parameter, nan on no arm; ``otherwise`` is the arc length of
     those: minus infinity on the hub, which stands, infinity on the rim, which turns.
@@ -128,8 +135,7 @@ def carried_points(
     arc += np.minimum(theta - first, 0) * line.speed(first)
     arc += np.maximum(theta - last, 0) * line.speed(last)
     arc = np.where(np.isnan(theta), otherwise, arc).clip(nodes[0], nodes[-1])
-    motion = np.column_stack([arm.rod.nodes_m, state.nodes_m, state.rotation_rad])
-    before, after, turn = np.split(CubicSpline(nodes, motion)(arc), [2, 4], axis=1)
+    before, after, turn = np.split(motion(arc), [2, 4], axis=1)
     cosine, sine = np.cos(turn[:, 0]), np.sin(turn[:, 0])
     x, y = (points - before).T
     return after + np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=1)

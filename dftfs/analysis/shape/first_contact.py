@@ -26,7 +26,7 @@ from dftfs.errors import SolveError
 from dftfs.spring.clearance import CEILING, FLOOR
 from dftfs.spring.edges import Edge, rotate
 from dftfs.spring.planar_rod import RodState, twist_rod
-from dftfs.spring.rod_contact import Contact, carried_points, contact_onset
+from dftfs.spring.rod_contact import Contact, carried_points, contact_onset, section_motion
 from dftfs.spring.rod_kernel import evaluate
 
 _TIP = ("tip_face", "tip_round")
@@ -188,11 +188,11 @@ def carried_edge(
     theta = edge.parameter(t) if hasattr(edge, "parameter") else np.full(len(t), np.nan)
     if edge.name.split(":")[0] in _TIP:
         theta = np.full(len(t), arm.outline.feet.tip_theta)
-    points = edge.point(t)
+    points, motion = edge.point(t), section_motion(arm, state)
     if not floor:
-        return carried_points(arm, points, theta, np.inf, state)
+        return carried_points(arm, points, theta, np.inf, motion)
     pitch = arm.outline.parameters.pitch_rad
-    return rotate(carried_points(arm, rotate(points, -pitch), theta, -np.inf, state), pitch)
+    return rotate(carried_points(arm, rotate(points, -pitch), theta, -np.inf, motion), pitch)
 
 
 def _edges(shaped: ShapedArm) -> dict[str, Edge]:

@@ -126,6 +126,7 @@ def other_limits(
     return tuple(found)
 
 
+STIFFNESS = "stiffness off target"
 RANGE = "difference of both contact-free torques"
 
 

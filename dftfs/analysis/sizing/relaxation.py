@@ -14,11 +14,12 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 
+from dftfs.analysis.sizing.archive import Archive, Assess
 from dftfs.analysis.sizing.grid import Grid
 from dftfs.analysis.sizing.limits import RANGE, Limit, staged_violation
 from dftfs.analysis.sizing.ranges import derived_ranges
 from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, assess_values
-from dftfs.analysis.sizing.search import Archive, Assess, search
+from dftfs.analysis.sizing.search import search
 from dftfs.analysis.sizing.task import SizingTask
 from dftfs.analysis.strength.fatigue_lives import rated_line
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from dftfs.analysis.sizing.limits import (
     STAGES,
+    STIFFNESS,
     Limit,
     at_least,
     at_most,
@@ -51,6 +52,7 @@ class Candidate:
 
     index : number of each searched dimension's value in its grid. violation : 0 inside all limits,
     else `staged_violation`. gap_left_m : smallest gap at the asked torque, 2 % beyond.
+    stresses_Pa : of the arm and of its root, winding then unwinding; stress_Pa is their largest.
     """
 
     index: tuple[int, ...]
@@ -61,6 +63,7 @@ class Candidate:
     stiffness_Nm_per_rad: float | None = None
     mass_kg: float | None = None
     stress_Pa: float | None = None
+    stresses_Pa: tuple[float, ...] = ()
     gap_left_m: float | None = None
     why: str = ""
     material: str = ""
@@ -125,7 +128,7 @@ def assess_values(
             missing = (task.process.gap_m - gap) / spiral.thickness_m
             violation = len(STAGES) - 1 + missing / (1 + missing)
             return Candidate(**known, violation=violation, limits=(), why="coils too close")
-        outline = build_outline(spiral)
+        outline = build_outline(spiral, advise=False)
         arm = arm_rod(
             outline,
             _UNIT_WIDTH_m,
@@ -189,7 +192,9 @@ def _judged(
             )
             for direction, share in torque.items()
         ),
-        *strength_limits(task, outline.parameters, material, *stresses),
+        *strength_limits(
+            task, outline.parameters, material, max(stresses[::2]), max(stresses[1::2])
+        ),
     )
     if task.equal_range is not None and staged_violation(limits) < 1:  # only the rest is open
         limits += (_range(task, arm, stiffness, width / _UNIT_WIDTH_m),)
@@ -199,6 +204,7 @@ def _judged(
         violation=violation,
         limits=limits,
         stress_Pa=max(stresses),
+        stresses_Pa=stresses,
         gap_left_m=min(gaps.values()),
         why="" if violation == 0 else _worst(limits),
     )
@@ -231,7 +237,7 @@ def _shape_limits(
     )
     return (
         Limit(
-            name="stiffness off target",
+            name=STIFFNESS,
             asked=100 * allowed,
             found=100 * off,
             unit="%",
@@ -254,8 +260,8 @@ def _shape_limits(
 
 def _loaded(
     task: SizingTask, outline: SpringOutline, arm: ArmRod, stiffness: float, share: float
-) -> tuple[dict[str, float], dict[str, float], tuple[float, float]]:
-    """Torque at first contact over the asked one, gap (m) per direction, stress (Pa) of arm, root.
+) -> tuple[dict[str, float], dict[str, float], tuple[float, ...]]:
+    """Torque at first contact over the asked one, gap (m) per direction, stresses (Pa).
 
     The angle of the asked torque is its share of the stiffness, corrected once by the torque found.
     The torque at contact is found between three gaps, at rest, half and the whole of the torque:
@@ -264,7 +270,7 @@ def _loaded(
     asked = _CONTACT_RESERVE * task.contact_free_torque_Nm
     samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
     rest = state_clearance(arm, samples, twist_rod(arm.rod, 0.0)).smallest_m
-    torques, gaps, stresses = {}, {}, (0.0, 0.0)
+    torques, gaps, stresses = {}, {}, ()
     arms = outline.parameters.n_arms
     for direction, sign in ((WINDING, 1.0), (UNWINDING, -1.0)):
         state, reach = _twisted(arm, sign * asked / stiffness, asked / (arms * share))
@@ -275,8 +281,7 @@ def _loaded(
         # the stress does not know the width: at the same angle torque and section both carry it
         torque = abs(arms * share * state.end_torque_Nm)
         share_of_torque = task.operating_torque_Nm / torque
-        arm_Pa, root_Pa = (share_of_torque * peak for peak in _peaks(arm, state))
-        stresses = max(stresses[0], arm_Pa), max(stresses[1], root_Pa)
+        stresses += tuple(share_of_torque * peak for peak in _peaks(arm, state))
     return torques, gaps, stresses
 
 

@@ -2,8 +2,9 @@
 
 Differential evolution on the grids' numbers (Storn & Price 1997, as in scipy, integrality on),
 on the whole grids and then on a part of them around the best, with Deb's rule for the limits
-(feasible before infeasible; CMAME 186, 2000) in stages (`limits.staged_violation`); then a
-pattern search over single and paired steps of the grid. Everything that was judged on the way is
+(feasible before infeasible; CMAME 186, 2000) in stages (`limits.staged_violation`); then quadratic
+models of what was judged around the best distinct candidates (`local_models`), and a pattern
+search over single and paired steps of the grid. Everything that was judged on the way is
 kept: the front of mass, stress and travel is what no other feasible candidate beats in all three.
 Deterministic by seed, whatever the number of processes.
 """
@@ -11,22 +12,22 @@ Deterministic by seed, whatever the number of processes.
 import itertools
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, assess, promising
+from dftfs.analysis.sizing.archive import Archive, Assess
+from dftfs.analysis.sizing.local_models import distinct, follow_models
+from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, promising
 from dftfs.analysis.sizing.task import SizingTask
-
-Assess = Callable[[Sequence[tuple[int, ...]]], Iterable[Candidate]]
-Merit = Callable[[Candidate], float]
 
 _POPULATION = 48
 _DRAWS = 60  # random candidates for each one of the first population, until its coils stand apart
 # share of the grids around the best, and generations there
 _ZOOMS = ((1.0, 14), (0.15, 8), (0.04, 8))
+_REGIONS = 6  # that local models follow
 _MOST_ROUNDS = 6
 _STEPS = (1, -1, 4, -4)
 
@@ -56,44 +57,6 @@ class Sizing:
     stops: tuple[Stop, ...]
     judged: int
     wall_s: float
-
-
-@dataclass
-class Archive:
-    """Candidates by their index; each is judged once. ``merit`` ranks them, the smallest first."""
-
-    task: SizingTask
-    assess: Assess
-    merit: Merit
-    known: dict[tuple[int, ...], Candidate] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, task: SizingTask, judge: Assess | None, merit: Merit | None = None) -> "Archive":
-        """An empty one that ranks by the task's objective unless told otherwise."""
-        return cls(
-            task=task,
-            assess=judge or (lambda many: (assess(task, i) for i in many)),
-            merit=merit or (lambda candidate: candidate.merit(task.objective)),
-        )
-
-    def judge(self, indices: Iterable[tuple[int, ...]]) -> list[Candidate]:
-        """Candidates by their numbers, in their order; new ones are assessed."""
-        wanted = list(indices)
-        new = [index for index in dict.fromkeys(wanted) if index not in self.known]
-        for candidate in self.assess(new) if new else ():
-            self.known[candidate.index] = candidate
-        return [self.known[index] for index in wanted]
-
-    @property
-    def best(self) -> Candidate:
-        """The first by merit; ties by index, so that the order is one."""
-        return min(self.known.values(), key=lambda c: (self.merit(c), c.index))
-
-    @property
-    def feasible(self) -> list[Candidate]:
-        """All feasible ones, the best first."""
-        found = [candidate for candidate in self.known.values() if candidate.feasible]
-        return sorted(found, key=lambda c: (self.merit(c), c.index))
 
 
 def search(
@@ -158,6 +121,7 @@ def size(
     best = search(archive, seed=seed, starts=starts, on_progress=on_progress)
     if not best.feasible:
         return archive
+    best = follow_models(archive, distinct(archive, _REGIONS), seed=seed, on_progress=on_progress)
     best, around = _refine(archive, best, on_progress)
     feasible = archive.feasible
     return Sizing(

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dftfs.analysis.torsion.planar_guess import planar_guess
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.result import ContactOnset
 from dftfs.errors import SolveError
@@ -103,7 +104,8 @@ def path_to_contact(
             gaps.append(_gap(problem, state)[0])
         return bool(gaps) and gaps[-1] <= 0
 
-    path = solve_path(static, targets, solver=solver, step_callback=keep)
+    guess = planar_guess(problem, [0.0, float(targets[0])], contact=False, solver=solver)
+    path = solve_path(static, targets, solver=solver, step_callback=keep, guess=guess)
     rest, rest_gap = path.states[0], problem.coil_gap.clearance().smallest_m
     onset = None
     if path.stopped:
@@ -171,8 +173,12 @@ def continued_in_contact(
 
     why = "the deflection asked for, coils in contact"
     static = problem.static_problem(contact=True)
+    known = [path.free[-1].t, *goals[:2]]  # then two states in contact can be extrapolated
+    guess = planar_guess(problem, known, contact=True, solver=path.solver)
     try:
-        solve_path(static, goals, start=path.free, solver=path.solver, step_callback=keep)
+        solve_path(
+            static, goals, start=path.free, solver=path.solver, step_callback=keep, guess=guess
+        )
     except SolveError as error:
         why = f"in contact, {error}"
     if not states:
