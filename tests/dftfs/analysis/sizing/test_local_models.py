@@ -59,7 +59,7 @@ def test_a_few_evaluations_find_the_lightest_of_the_grid(seed):
     assert len({start.index for start in starts}) == len(starts) > 0
     found = follow_models(archive, starts, seed=seed)
     assert found.feasible
-    assert found.mass_kg <= 1.002 * best
+    assert found.mass_kg <= 1.01 * best  # the 1 % that `benchmarks.sizing_tasks` is held to
     assert len(archive.known) < 500  # of 68921
 
 
