@@ -25,6 +25,7 @@ from rsea_core.identify.multistep.tracks import Track
 
 CELL, BEGIN = 0.5, 2.0  # time scales of the motion: width, and earliest onset
 MOST_CELLS = 100  # of a recording
+LONGEST_SCALE = 0.05  # of a recording: the time scale of a wheel that turns on grows with its angle
 STEP = 0.05  # of the width: scale of a fit's onset
 
 
@@ -52,7 +53,8 @@ def pulses(projection: Projection) -> list[Candidate]:
 def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | None:
     r = t.experiment.recording
     length = float(r.time_s[-1] - r.time_s[0])
-    cells = int(np.clip(length / (CELL * t.scale.time_s), 4, MOST_CELLS))
+    time_s = min(t.scale.time_s, LONGEST_SCALE * length)
+    cells = int(np.clip(length / (CELL * time_s), 4, MOST_CELLS))
     width = length / cells
     at = np.minimum(((r.time_s - r.time_s[0]) / width).astype(int), cells - 1)
     torque = float(t.scale.torque_Nm[1])
@@ -62,7 +64,7 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
     B = np.linalg.solve(projection.L, projection.J @ columns.T)
     G = columns @ columns.T - B.T @ B
     h = columns @ projection.left
-    begin = min(int(np.ceil(BEGIN * t.scale.time_s / width)), cells - 2)
+    begin = min(int(np.ceil(BEGIN * time_s / width)), cells - 2)
     first, last, size, gain = _best_interval(G, h, begin)
     if gain <= 0.0:
         return None

@@ -1,5 +1,7 @@
 """A torque that acts once is found in time and size, and nothing is where none acted."""
 
+from dataclasses import replace
+
 import pytest
 
 from rsea_core.effects.load_disturbance import LoadDisturbance
@@ -43,3 +45,15 @@ def test_an_axis_that_nothing_pushed_has_no_candidate(tmp_path, seed):
     problem = MultistepProblem(case)
     estimator, base, _ = parameters(problem, Hypothesis(laws=nuisances(case)), lambda _: None)
     assert pulses(Projection(without_slow_torque(estimator), base)) == []
+
+
+def test_a_pulse_is_located_where_the_time_scale_is_as_long_as_the_pulse_is_late(tmp_path):
+    # as of a wheel that turns on: its angle spreads with the length of the recording
+    case = axis_case(tmp_path, axis_recording(PULSE, seed=5), rig=axis_rig())
+    problem = MultistepProblem(case)
+    estimator, base, _ = parameters(problem, Hypothesis(laws=nuisances(case)), lambda _: None)
+    own = without_slow_torque(estimator)
+    own = own.having([replace(t, scale=replace(t.scale, time_s=4.0)) for t in own.tracks])
+    start_s, width_s, *_ = pulses(Projection(own, base))[0].start
+    assert start_s == pytest.approx(PULSE.start_s, abs=0.6)
+    assert start_s + width_s == pytest.approx(PULSE.end_s, abs=0.6)
