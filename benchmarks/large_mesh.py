@@ -29,8 +29,8 @@ def main() -> None:
 
     def say(text: str) -> None:
         cpu, wall = time.process_time() - begun[0], time.perf_counter() - begun[1]
-        peak_GB = getrusage(RUSAGE_SELF).ru_maxrss / 1024**2
-        print(f"{text}: {cpu:.0f} s CPU, {wall:.0f} s wall, {peak_GB:.2f} GB", flush=True)
+        peak_GiB = getrusage(RUSAGE_SELF).ru_maxrss / 1024**2
+        print(f"{text}: {cpu:.0f} s CPU, {wall:.0f} s wall, {peak_GiB:.2f} GiB", flush=True)
 
     choice = MeshChoice(size=arguments.size, layers=arguments.layers)
     problem = meshed_problem(load_design("al1"), choice, dimension=3)

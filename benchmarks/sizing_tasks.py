@@ -1,8 +1,8 @@
 """The sizing's search against 20,000 rod evaluations of plain differential evolution.
 
 `python -m benchmarks.sizing_tasks` runs four tasks that can be met and two that cannot, each by one
-call as `dftfs size` makes it (finite elements left out); `--further` runs four others, for which
-the search was not chosen; `--brute-force` adds the comparison, some minutes for
+call as `dftfs size` makes it (finite elements left out); `--further` runs four others, which
+were not used while the search was developed; `--brute-force` adds the comparison, some minutes for
 each task. Both search the same grids with the same judge; the brute force knows no zooming, no
 local models, no pattern search and no screened first population.
 """
@@ -42,7 +42,7 @@ TASKS = {
         "process": "milling",
     },
 }
-# as many again of other stiffness, envelope, material, process and requirements
+# of other stiffness, envelope, material, process and requirements
 FURTHER = {
     "20 Nm/rad, 8 Nm, 120 mm, Ti-6Al-4V, water jet, 1e5 cycles": {
         "stiffness_Nm_per_rad": "20",

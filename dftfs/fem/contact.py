@@ -168,7 +168,7 @@ class ContactBody:
         )
         adjacency = _sharing_a_node(surfaces.master)
         self._adjacency = block_diag([adjacency] * copies, format="csr")
-        self._place = self._no_place()
+        self._place = np.full(self._apart.shape, -1, dtype=np.int32)
         self._multiplier = np.zeros(self._area.shape)
         self.friction: Friction | None = None
         if self.law.friction_coefficient > 0:
@@ -268,21 +268,17 @@ class ContactBody:
         if self.friction is not None:
             a, b = np.nonzero(self.friction.active)
             held = a, self.friction.state.anchor[a, b]
-        pulled = np.any(self._place[held] == 0)
-        if not pulled and not np.any(self._place[s, touch.found[s, p]] == 0):
+        pulled = np.any(self._place[held] < 0)
+        if not pulled and not np.any(self._place[s, touch.found[s, p]] < 0):
             return None
         s, p = np.nonzero((touch.found >= 0) & (gap < _COUPLED_WITHIN * self.law.smoothing_m))
         rows, columns = (np.append(*pair) for pair in zip((s, touch.found[s, p]), held))
         near = coo_array((np.ones(len(rows)), (rows, columns)), shape=self._place.shape)
-        wanted = (self._place > 0) | ((near.tocsr() @ self._adjacency).toarray() > 0)
+        wanted = (self._place >= 0) | ((near.tocsr() @ self._adjacency).toarray() > 0)
         pairs = np.argwhere(wanted & self._apart)
-        self._place = self._no_place()
-        self._place[pairs[:, 0], pairs[:, 1]] = np.arange(1, len(pairs) + 1)
+        self._place[:] = -1
+        self._place[pairs[:, 0], pairs[:, 1]] = np.arange(len(pairs))
         return np.hstack([self._slave[pairs[:, 0]], self._master[pairs[:, 1]]])
-
-    def _no_place(self) -> NDArray[np.int32]:
-        """Zeros for all pairs of facets: of what is never written the system keeps no page."""
-        return np.zeros(self._apart.shape, dtype=np.int32)
 
     def _positions(self, u: NDArray[np.float64]) -> tuple[NDArray, NDArray]:
         now = self._nodes + u

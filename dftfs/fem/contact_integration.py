@@ -62,7 +62,7 @@ class PairTarget(NamedTuple):
     ----------
     target : integration.Target
     offset (k, r (r + 1) / 2) : as `integration.scatter` takes it, one row a pair
-    place (s, m) : row of ``offset`` of a pair of slave and master facet, from 1; 0 has none
+    place (s, m) : row of ``offset`` of a pair of slave and master facet
     direction (n, D) : nodal values that the tangent is multiplied with
     """
 
@@ -110,7 +110,7 @@ def add_contact_block(block, geometry, s, m, pairs, sums, axes):
                     K[((a * D + i) * D + k) * P + b] = block[a * D + i, b * D + k]
     if turned.any():
         turn_blocks(K, turned, pairs.target.rotation, half, axes)
-    scatter(K, carrier, pairs.offset[pairs.place[s, m] - 1], pairs.target, sums.data, axes)
+    scatter(K, carrier, pairs.offset[pairs.place[s, m]], pairs.target, sums.data, axes)
 
 
 @njit(cache=True)

@@ -1,7 +1,7 @@
 """Coulomb friction of slave points on quadratic facets, in compiled loops.
 
-A point sticks, elastically, to its anchor: a material point xi of a master facet, known from
-the last state. With d = x_s - x_m(xi), n the facet's normal there, h = n . d and d_T = d - h n, the
+A point sticks, elastically, to its anchor: a material point xi of a master facet, known from the
+last state. With d = x_s - x_m(xi), n the facet's normal there, h = n . d and d_T = d - h n, the
 traction is along e = d_T / |d_T| and of size min(k |d_T|, limit), the derivative of Huber's
 function of |d_T| for a given limit. With t_a = x_m,a and t^a = M^ab t_b
 

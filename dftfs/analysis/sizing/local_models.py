@@ -1,12 +1,12 @@
-"""Quadratic models of what was judged near a candidate, and the grid's best points by them.
+"""Trust regions with quadratic models of the objective and of every limit's margin.
 
-The best spring lies where several limits bind at once. A population finds such a corner slowly:
-most steps towards it break one of the limits. Objective and margin of every limit are smooth in the
-dimensions, though, and what was judged nearby says how they run: a quadratic is fitted to each
-(nearer candidates weigh more, second derivatives are damped), the objective's minimum inside the
-others is found by SLSQP within a trust region, and the points of the grid around it are judged.
-Where one is better the region follows, where none is it shrinks (Conn, Gould & Toint, Trust-Region
-Methods, 2000). Numbers of arms and materials stay as they are at the region's centre.
+At the best spring several limits are active at once. An evolutionary search approaches such a point
+slowly, because most steps towards it violate one of the limits. Objective and margins are smooth
+functions of the dimensions, however: a quadratic is fitted to each from the candidates evaluated
+nearby (nearer ones weigh more, second derivatives are damped), SLSQP minimises the objective
+subject to the margins within a trust region, and the points of the grid around the minimum are
+evaluated. The region moves to a better candidate, and shrinks if there is none (Conn, Gould &
+Toint, Trust-Region Methods, 2000). Number of arms and material stay those of the region's centre.
 """
 
 import itertools
@@ -83,9 +83,9 @@ def follow_models(
     seed: int,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> Candidate:
-    """Judge what local models promise around some candidates, until they promise no more.
+    """Evaluate the minima of local models around some candidates until none is an improvement.
 
-    The regions take turns in one batch, so that several processes have enough to judge.
+    The points of all regions are evaluated in one batch, so that several processes are busy.
     """
     rng, steps = np.random.default_rng((seed, len(_CHOSEN))), _free_steps(archive.task)
     regions = [Region(start, np.maximum(_FIRST_REACH * steps, 2.0)) for start in starts]
@@ -185,7 +185,7 @@ def _promised(archive: Archive, region: Region, rng: np.random.Generator) -> lis
 
 
 def _fitted(archive: Archive, region: Region) -> Quadratics | None:
-    """Models of the candidates around; None where too few were loaded."""
+    """Models of the candidates around; None if too few of them were loaded."""
     task, free = archive.task, _free(archive.task)
     chosen = _chosen(task, region.centre.index)
     names = [limit.name for limit in region.centre.limits]
@@ -210,13 +210,13 @@ def _fitted(archive: Archive, region: Region) -> Quadratics | None:
 
 
 def _exact(task: SizingTask, candidate: Candidate, count: int) -> list[float]:
-    """Objective and margins with the width that the stiffness asks for, not the grid's nearest.
+    """Objective and margins at the width that gives the stiffness exactly, before it is rounded.
 
-    Torques, mass and, inversely, stresses are proportional to the width; rounded, they jump.
+    Torque and mass are proportional to the width, stress inversely: rounding makes them jump.
     """
     grid, width = task.by_name["width_mm"], candidate.width_mm or 0.0
     share = task.stiffness_Nm_per_rad / (candidate.stiffness_Nm_per_rad or np.inf)
-    # what the stiffness asks for may lie beyond the ends of the width by the tolerance
+    # that width may lie outside of the grid by the tolerance of the stiffness
     spare = 1 + task.stiffness_tolerance
     widths = [share * width / grid.low - 1 / spare, spare - share * width / grid.value(grid.steps)]
     if grid.nearest(width) in (0, grid.steps):
@@ -236,7 +236,7 @@ def _exact(task: SizingTask, candidate: Candidate, count: int) -> list[float]:
 
 
 def _of_each_stress(candidate: Candidate, limit: Limit, share: float) -> list[float]:
-    """Margins of the stresses that a limit is the largest of: their largest has a kink."""
+    """Margins of each stress that enters a limit: their maximum is not differentiable."""
     stresses = candidate.stresses_Pa
     if limit.stage == "life":
         stresses = stresses[::2] if " arm " in limit.name else stresses[1::2]

@@ -22,6 +22,7 @@ from dftfs.analysis.sizing.archive import Archive, Assess
 from dftfs.analysis.sizing.local_models import distinct, follow_models
 from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, promising
 from dftfs.analysis.sizing.task import SizingTask
+from rsea_core.numeric.threads import on_one_blas_thread
 
 _POPULATION = 48
 _DRAWS = 60  # random candidates for each one of the first population, until its coils stand apart
@@ -94,6 +95,7 @@ def search(
     return archive.best
 
 
+@on_one_blas_thread  # round-off of several threads would lead to other candidates
 def size(
     task: SizingTask,
     *,

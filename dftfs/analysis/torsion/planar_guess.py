@@ -1,10 +1,10 @@
-"""Where a solid's equilibrium will be, from plane stress on the mesh that it is extruded from.
+"""Start values for 3D equilibria from plane-stress solutions on the mesh that is extruded.
 
-Without a history of states Newton's method needs five to seven factorisations for a large turn,
-or for the first contact; of a solid with half a million unknowns each takes as long as the whole
-path in the plane. What the plane's states differ by is added to the solid's last state, the
-thickness changes at the rate of that state. It is a start only: what is found is the solid's own
-equilibrium.
+Without earlier states Newton's method needs five to seven factorisations for a large rotation or
+for the first contact; with half a million unknowns each takes as long as the whole plane-stress
+path. The difference of two plane-stress states is added to the last 3D state; displacements through
+the thickness are extrapolated at their rate. Only the start of the iteration depends on this, not
+the equilibrium.
 """
 
 from collections.abc import Sequence
@@ -22,7 +22,7 @@ from dftfs.fem.path_state import PathState
 def planar_guess(
     problem: TorsionProblem, deflections: Sequence[float], *, contact: bool, solver: str
 ) -> Guess | None:
-    """Starts for the states of a solid at some deflections (rad), from another of them each.
+    """Start values for the 3D states at some deflections (rad), each from another of them.
 
     None for a problem in the plane, and where plane stress finds no equilibrium.
     """

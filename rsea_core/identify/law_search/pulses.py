@@ -25,7 +25,7 @@ from rsea_core.identify.multistep.tracks import Track
 
 CELL, BEGIN = 0.5, 2.0  # time scales of the motion: width, and earliest onset
 MOST_CELLS = 100  # of a recording
-LONGEST_SCALE = 0.05  # of a recording: the time scale of a wheel that turns on grows with its angle
+LONGEST_SCALE = 0.05  # of a recording: with steady rotation the time scale grows with the angle
 STEP = 0.05  # of the width: scale of a fit's onset
 
 

@@ -144,7 +144,7 @@ def _with_other_timing(
     Parameters
     ----------
     least : float
-        Share of what the laws taken leave, that these times must explain.
+        Share of the cost beyond noise with the laws taken, that other times must explain.
     """
     own, h, case = search.own, search.fit.hypothesis, search.own.problem.case
     least *= search.excess()

@@ -62,8 +62,9 @@ class WholeSearch(TakenLaws):
     def add_small(self, trials: Sequence[Trial], say) -> bool:
         """Take a law that gains little, if it explains most of what is left; whether one does.
 
-        Beside a large effect a small one gains a small share. A law of the wrong kind follows the
-        errors that another's form leaves in part only; a torque that acts once follows any.
+        Beside a large effect a small one gains a small share of the cost. A wrong law explains only
+        part of the errors that an inexact form of another law leaves. A torque that acts once is
+        left out: it can fit any such error.
         """
         before = self.excess()
         lasting = (t for t in trials if t.law.effect != LoadDisturbance.effect)

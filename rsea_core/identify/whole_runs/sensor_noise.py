@@ -29,15 +29,16 @@ from rsea_core.identify.multistep.tracks import Track, prepared
 from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_by_counts, count_of
 
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
-SIZES = np.geomspace(0.05, 6.0, 28)  # moves of a value, in tolerances
-MOVES = np.concatenate([-SIZES[::-1], [0.0], SIZES])
+STEPS = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
+MOVES = np.concatenate([-STEPS[::-1], [0.0], STEPS])
 
 
 def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estimator:
     """Another estimator, of whole recordings, with the readings' noise and hardly any torques'.
 
-    Errors that last over many rows are the model's: a sensor's colour is its filter's. Beside an
-    unknown torque that follows each count the noise of an encoder is estimated too small.
+    Errors that last over many rows are the model's: a sensor's colour is its filter's. If the
+    unknown torque was estimated so large that it explains single counts, the estimated noise of an
+    encoder is too small: that of the counts is its lower limit.
 
     Parameters
     ----------
@@ -145,9 +146,9 @@ def well_fitted(own: Estimator, fit: Estimate) -> Estimate:
 
 
 def _minima(costs: NDArray) -> NDArray:
-    """Places of the minima in rows of costs (n, k) but those of the fit itself, the lowest first.
+    """Flat indices of the local minima in rows of costs (n, k), the lowest first.
 
-    The middle column is the fit; a row without another minimum leads back to it.
+    The middle column is the fit itself and is left out.
     """
     inner = (costs[:, 1:-1] < costs[:, :-2]) & (costs[:, 1:-1] <= costs[:, 2:])
     inner[:, costs.shape[1] // 2 - 1] = False

@@ -47,8 +47,8 @@ def test_an_axis_that_nothing_pushed_has_no_candidate(tmp_path, seed):
     assert pulses(Projection(without_slow_torque(estimator), base)) == []
 
 
-def test_a_pulse_is_located_where_the_time_scale_is_as_long_as_the_pulse_is_late(tmp_path):
-    # as of a wheel that turns on: its angle spreads with the length of the recording
+def test_a_pulse_is_located_although_the_time_scale_of_the_motion_is_long(tmp_path):
+    # as with steady rotation, where the spread of the angle grows with the recording
     case = axis_case(tmp_path, axis_recording(PULSE, seed=5), rig=axis_rig())
     problem = MultistepProblem(case)
     estimator, base, _ = parameters(problem, Hypothesis(laws=nuisances(case)), lambda _: None)
