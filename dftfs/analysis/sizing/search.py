@@ -17,12 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
+from threadpoolctl import threadpool_limits
 
 from dftfs.analysis.sizing.archive import Archive, Assess
 from dftfs.analysis.sizing.local_models import distinct, follow_models
 from dftfs.analysis.sizing.rod_candidate import INFEASIBLE, Candidate, promising
 from dftfs.analysis.sizing.task import SizingTask
-from rsea_core.numeric.threads import on_one_blas_thread
 
 _POPULATION = 48
 _DRAWS = 60  # random candidates for each one of the first population, until its coils stand apart
@@ -95,7 +95,8 @@ def search(
     return archive.best
 
 
-@on_one_blas_thread  # round-off of several threads would lead to other candidates
+# with several threads, different round-off would lead to different candidates
+@threadpool_limits.wrap(limits=1, user_api="blas")
 def size(
     task: SizingTask,
     *,
