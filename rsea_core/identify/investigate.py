@@ -16,6 +16,7 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
 from rsea_core.identify.law_search.hold_out import with_pause_shown, with_shared_recordings
 from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
+from rsea_core.identify.law_search.shorter_windows import in_shorter_windows, predicts_closer
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     DOUBTED_SHARE,
@@ -70,6 +71,11 @@ def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:
             say("searched again: with the laws found, commands act at other times")
             again = searched(case, timing, say, quick=quick)
             found = _better_search(found, _begun_by_contender(again, say), again)
+    if not quick and _doubtful(found):
+        shorter = in_shorter_windows(found, say)
+        if shorter is not None:
+            add_all(shorter, laws_of(shorter), say)
+            found = shorter if predicts_closer(shorter, found) else found
     if not quick and encoders_disagree(found):
         found = _better_search(found, _through_gear_mesh(case, found, say))
     return replace(found, left_by_parameters=left, sound_below=below)

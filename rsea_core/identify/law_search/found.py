@@ -8,7 +8,7 @@ from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
-from rsea_core.identify.multistep.criteria import LEAST_EXCESS, SOUND
+from rsea_core.identify.multistep.criteria import LEAST_EXCESS, LOST, SOUND
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 
@@ -61,6 +61,8 @@ class Found:
         Parameters alone and with laws; the costs of `best` are with its own noise.
     horizon, base_horizon : float or None
         Up to which the machine is predictable with laws, and with parameters alone; None: all rows.
+    lost : float
+        Error over the spread of a reading, beyond which a horizon with laws is too long.
     steps : list of Step
         One for each law.
     refused : Step or None
@@ -90,6 +92,7 @@ class Found:
     best: Estimate
     horizon: float | None
     base_horizon: float | None = None
+    lost: float = LOST
     shared: dict[str, str] = field(default_factory=dict)
     pause_shown: bool = False
     steps: list[Step] = field(default_factory=list)
@@ -129,7 +132,7 @@ class Found:
         return Found(
             problem=self.problem, base_estimator=self.base_estimator, base=self.base,
             estimator=self.base_estimator, best=self.base, horizon=self.base_horizon,
-            base_horizon=self.base_horizon,
+            base_horizon=self.base_horizon, lost=self.lost,
         )  # fmt: skip
 
     def parameters_alone(self) -> "Found":

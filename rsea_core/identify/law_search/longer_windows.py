@@ -43,11 +43,11 @@ def lengthened(found: Found, say, *, quick: bool = False) -> None:
         fit = trial.fit(h, found.best.x, iterations=5)
         error = relative_error(trial, h, fit.x)
         say(f"with laws over {HORIZONS[at + 1] or 'all'} T: error {error:.3g} of the spread")
-        if error > LOST and not quick:
+        if error > LOST == found.lost and not quick:
             trial, fit = _by_output_error(trial, fit, found)
             error = relative_error(trial, h, fit.x)
             say(f"  from output errors: {error:.3g}")
-        if error > LOST:
+        if error > found.lost:
             break
         smooth(trial, h, fit.x)
         trial = with_noise(trial.having([prepared(t) for t in trial.tracks]), h, fit.x)
@@ -105,10 +105,10 @@ def _by_output_error(trial: Estimator, fit: Estimate, found: Found) -> tuple[Est
 def error_left_beyond(found: Found) -> float | None:
     """Share of the parameters' error in the next longer windows that the laws leave.
 
-    A law of the machine holds beyond the windows that it was fitted in. None where these hold whole
-    recordings, or where nothing predicts the longer ones.
+    A law of the machine holds beyond the windows that it was fitted in. None where it made these
+    longer, where they hold whole recordings, or where nothing predicts the longer ones.
     """
-    if found.horizon is None or not found.steps:
+    if found.horizon is None or found.predicts_longer or not found.steps:
         return None
     longer = HORIZONS[HORIZONS.index(found.horizon) + 1]
     errors = []

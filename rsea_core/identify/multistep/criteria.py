@@ -4,6 +4,7 @@ HORIZONS = (0.1, 0.3, 1.0, 4.0, 16.0, None)
 """Lengths of windows in time scales of the motion; None: the whole recording."""
 LOST = 0.3  # error over the spread of a reading beyond which a horizon is too long
 DOUBTED_ERROR = 0.05  # share of the spread: a larger error of the longest windows is doubted too
+CLOSER = 0.5  # of another search's error in the same windows: laws of shorter windows stand
 DOUBTED_SHARE = 0.4  # of independent innovations, below which no law fits the machine quite
 DEPENDENT = 0.3  # the same, below which values alone do not explain the recordings
 LEAST_ROWS = 10  # of a window

@@ -186,7 +186,7 @@ def _grown(
     smooth(estimator, h, x)
     kept, known = None, False
     for horizon in HORIZONS:
-        if horizon is not None and not _long_enough(estimator, horizon):
+        if horizon is not None and not long_enough(estimator, horizon):
             continue
         trial = estimator.having(with_windows(estimator, horizon))
         fit = trial.fit(h, x, iterations=5) if known else with_best_delay(trial, h, x)
@@ -260,7 +260,7 @@ def with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimate
     return estimator.fit(h, min(tried, key=lambda fit: fit.cost).x, iterations=5)
 
 
-def _long_enough(estimator: Estimator, horizon: float) -> bool:
+def long_enough(estimator: Estimator, horizon: float) -> bool:
     """Whether windows of a length hold enough rows to tell a start from a motion."""
     return all(
         horizon * t.scale.time_s > LEAST_ROWS * t.block * t.experiment.recording.sample_time_s

@@ -32,6 +32,7 @@ from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect, worth
 from rsea_core.identify.whole_runs.sensor_noise import (
+    converged,
     excess,
     in_noise_left_by,
     in_sensor_noise,
@@ -165,6 +166,8 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
     if excess_before == 0.0:  # one reading is not predicted, and others better than their noise
         return None
     for trial in _alone(search):
+        if trial.law.only is not None:
+            continue  # where something else is left, a torque that acts once can pass for it
         explained = 1.0 - excess(own, trial.fit.hypothesis, trial.fit.x) / excess_before
         if explained < EXPLAINED:
             continue
@@ -205,7 +208,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         return found
     own = in_sensor_noise(found.base_estimator, found.base)
     h = found.best.hypothesis
-    fit = own.fit(h, found.best.x, iterations=12)
+    fit = converged(own, h, found.best.x)
     left = misfit(own, h, fit.x) if found.steps else np.inf
     if nearly is not None:
         best = nearly.best
@@ -223,8 +226,11 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         needed(own, fit, step.law, without(own, fit, step.law))[0] for step in found.steps
     ):
         return found
-    plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
-    return replace(found, complete=unseen_share(found, own, fit, plain, say) < UNPREDICTED)
+    plain = converged(own, found.base.hypothesis, found.base.x)
+    if unseen_share(found, own, fit, plain, say) >= UNPREDICTED:
+        return found
+    own, fit = _in_own_share(own, fit)
+    return replace(found, complete=True, estimator=own, best=fit, horizon=None)
 
 
 def _with_shape(found: Found, own: Estimator, say) -> Found:
@@ -265,11 +271,16 @@ def _enough(left: float) -> float:
     return max(min(COMPLETE, most), COMPLETE_SHARE * left)
 
 
+def _in_own_share(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """A fit of whole recordings in its own share of independent innovations."""
+    own = own.having(own.tracks)
+    own.tempering = independent_share(own, fit.hypothesis, fit.x)
+    return own, own.fit(fit.hypothesis, fit.x, iterations=4)
+
+
 def _complete(found: Found, search: WholeSearch) -> Found:
     """The search's laws as what was found."""
-    own, fit = search.own.having(search.own.tracks), search.fit
-    own.tempering = independent_share(own, fit.hypothesis, fit.x)
-    fit = own.fit(fit.hypothesis, fit.x, iterations=4)
+    own, fit = _in_own_share(search.own, search.fit)
     steps = []
     for law in [w for w in fit.hypothesis.laws if any(w is other for other in search.taken)]:
         alone = len(search.taken) == 1

@@ -36,8 +36,8 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
-from rsea_core.identify.whole_runs.sensor_noise import excess, misfit
-from rsea_core.identify.whole_runs.taken_laws import CONVERGED, SIZES, TakenLaws, Trial
+from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
+from rsea_core.identify.whole_runs.taken_laws import SIZES, TakenLaws, Trial
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
 
@@ -56,7 +56,7 @@ class WholeSearch(TakenLaws):
         if not worth or worth[0] < LEAST_OF_LEFT * self.plain_excess():
             return self.add_small(trials, say)
         self.first = self.first or trials
-        self.take(best, self.converged(best), trials, say)
+        self.take(best, self.to_minimum(best), trials, say)
         return True
 
     def add_small(self, trials: Sequence[Trial], say) -> bool:
@@ -71,7 +71,7 @@ class WholeSearch(TakenLaws):
         best = next(lasting, None)
         if best is None or not self.taken or best.gain < NEARLY_EXPLAINED * before:
             return False
-        fit = self.converged(best)
+        fit = self.to_minimum(best)
         share = 1.0 - excess(self.own, fit.hypothesis, fit.x) / before
         say(f"  whole recordings: {best.law.key} explains {share:.2f} of what others leave")
         if share < EXPLAINED:
@@ -205,7 +205,7 @@ def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[T
     for t in trials:
         fit = search.fit if t.law is law else t.fit
         if t.law is not law and any(t is other for other in near[:WHOLE_RIVALS]):
-            fit = search.own.fit(fit.hypothesis, fit.x, iterations=CONVERGED)
+            fit = converged(search.own, fit.hypothesis, fit.x)
         gain = search.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
         left = misfit(search.own, fit.hypothesis, fit.x)
         found.append(replace(t, fit=fit, gain=gain, left=left))

@@ -30,6 +30,7 @@ from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_b
 
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
 STEPS = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
+CONVERGED = 60  # iterations at most, of the law that is taken: its minimum may be flat
 MOVES = np.concatenate([-STEPS[::-1], [0.0], STEPS])
 
 
@@ -123,6 +124,19 @@ def _without_lead(t: Track, late_s: float) -> Track:
     rows = np.array([[0, lead - 1], [lead, whole.rows[-1, 1]]])
     spread = np.concatenate([t.motion_std[:lead], UNSURE * t.motion_std[lead:]])
     return replace(t, windows=replace(whole, rows=rows), motion_std=spread, lead=lead)
+
+
+def converged(own: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
+    """A fit that gains nothing by being started again where it ended.
+
+    Steps that were once damped stay short, so that a fit in a flat valley stops before its minimum.
+    """
+    fit = own.fit(h, x, iterations=CONVERGED)
+    for _ in range(SCANS):
+        before, fit = fit, own.fit(h, fit.x, iterations=CONVERGED)
+        if before.cost - fit.cost < max(LEAST_GAIN, NEGLIGIBLE_FALL * abs(fit.cost)):
+            break
+    return fit
 
 
 def well_fitted(own: Estimator, fit: Estimate) -> Estimate:

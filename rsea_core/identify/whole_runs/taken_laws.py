@@ -19,10 +19,9 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.whole_runs.forms import alike, holds, richer_of
-from rsea_core.identify.whole_runs.sensor_noise import excess, misfit, well_fitted
+from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit, well_fitted
 from rsea_core.identify.whole_runs.unseen import other_values, without
 
-CONVERGED = 60  # iterations at most, of the law that is taken: its minimum may be flat
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
 
 
@@ -89,10 +88,9 @@ class TakenLaws:
         self.rivals[best.law.key] = list(trials)
         self.nearest_number(best.law, say)
 
-    def converged(self, trial: Trial) -> Estimate:
+    def to_minimum(self, trial: Trial) -> Estimate:
         """A trial's fit, continued to its minimum."""
-        fit = self.own.fit(trial.fit.hypothesis, trial.fit.x, iterations=CONVERGED)
-        return well_fitted(self.own, fit)
+        return well_fitted(self.own, converged(self.own, trial.fit.hypothesis, trial.fit.x))
 
     def better_form(self, least: float, share: float, say) -> bool:
         """Take another form of a law; whether there is one worth it.

@@ -9,7 +9,7 @@ from rsea_core.identify.law_search import longer_windows
 from rsea_core.identify.law_search.longer_windows import error_left_beyond
 
 
-def found_with(monkeypatch, horizon, plain: float, left: float):
+def found_with(monkeypatch, horizon, plain: float, left: float, *, longer: bool = False):
     """What a search found whose fits are wrong by these errors in the windows after `horizon`."""
     asked = []
 
@@ -22,7 +22,7 @@ def found_with(monkeypatch, horizon, plain: float, left: float):
     monkeypatch.setattr(longer_windows, "with_windows", lambda own, length: asked.append(length))
     monkeypatch.setattr(longer_windows, "relative_error", lambda own, h, x: own.error)
     found = SimpleNamespace(
-        horizon=horizon, steps=[None], base=fit, best=fit,
+        horizon=horizon, predicts_longer=longer, steps=[None], base=fit, best=fit,
         base_estimator=estimator(plain), estimator=estimator(left),
     )  # fmt: skip
     return found, asked
@@ -44,3 +44,9 @@ def test_whole_recordings_leave_nothing_longer_to_ask(monkeypatch):
 def test_windows_in_which_parameters_predict_nothing_say_nothing(monkeypatch):
     found, _ = found_with(monkeypatch, 1.0, 2.5, 2.4)
     assert error_left_beyond(found) is None
+
+
+def test_laws_that_made_the_windows_longer_have_held_beyond_theirs(monkeypatch):
+    found, asked = found_with(monkeypatch, 4.0, 0.5, 0.5, longer=True)
+    assert error_left_beyond(found) is None
+    assert asked == []

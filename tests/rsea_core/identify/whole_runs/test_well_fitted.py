@@ -1,6 +1,7 @@
 """Fits of whole recordings: minima a cycle away are left, and rows of unknown commands not used."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +10,12 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
-from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit, well_fitted
+from rsea_core.identify.whole_runs.sensor_noise import (
+    converged,
+    in_sensor_noise,
+    misfit,
+    well_fitted,
+)
 from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig, pendulum_case
 
 
@@ -59,3 +65,23 @@ def test_rows_in_which_unknown_commands_act_do_not_count(tmp_path):
     left = [misfit(own, h, own.fit(h, base.x, iterations=12).x) for own in (all_rows, known)]
     assert left[1] < 1.5
     assert left[0] > 3.0 * left[1]
+
+
+class Stopping:
+    """Fits that stop short of their minimum: each lowers the cost by the next of some falls."""
+
+    def __init__(self, *falls: float):
+        self.costs = list(1000.0 - np.cumsum([0.0, *falls]))
+        self.fits = 0
+
+    def fit(self, h, x, *, iterations):
+        self.fits += 1
+        cost = self.costs[min(self.fits - 1, len(self.costs) - 1)]
+        return SimpleNamespace(hypothesis=h, x=x, cost=cost)
+
+
+@pytest.mark.parametrize(("falls", "fits"), [((0.0,), 2), ((100.0, 0.0), 3), ((50.0,) * 9, 4)])
+def test_a_fit_is_started_again_as_long_as_that_lowers_its_cost(falls, fits):
+    own = Stopping(*falls)
+    assert converged(own, None, np.zeros(1)).cost == own.costs[own.fits - 1]
+    assert own.fits == fits
