@@ -88,6 +88,7 @@ SOUND_IN_LEFT_NOISE = 1.4  # the same in the noise that the best law leaves
 LEAST_EXCESS = 100.0  # cost above that of noise, from which a law is tried all the same
 SHAPE_SHARE = 0.5  # of the excess of parameters alone: least held-out gain of a shape
 COMPLETE_SHARE = 0.08  # or of what parameters alone leave: small things that every machine has
+ALIKE_OF_GAIN = 3e-4  # of a law's gain in whole recordings, which tells no plainer law from it
 DOUBT = 0.1  # of what is left above the noise, in units: by so much rivals are not told apart
 LEAST_OF_LEFT = 0.05  # of what laws gained on whole recordings so far: least gain of a further one
 WHOLE_LAWS, WHOLE_TRIED, WHOLE_FORMS = 3, 24, 3  # laws at most, fitted each time, of one effect

@@ -76,6 +76,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         search.prune(say)
     if search.left() <= search.enough:
         search.refine(say)
+        search.seek_rivals(say)
         search.compare(say)
         search.predict(say)
         say(f"whole recordings: laws taken leave {search.excess():.0f} units more than noise")

@@ -18,6 +18,7 @@ from rsea_core.identify.law_search.candidate_fits import at_bound, count_values,
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen, screen_again
 from rsea_core.identify.multistep.criteria import (
+    ALIKE_OF_GAIN,
     CLOSE_TO_BEST,
     EXPLAINED,
     LEAST_EXCESS,
@@ -37,6 +38,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
 from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
+from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
 from rsea_core.identify.whole_runs.taken_laws import SIZES, TakenLaws, Trial
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
@@ -140,6 +142,20 @@ class WholeSearch(TakenLaws):
                 self.fit = less
                 self.taken.remove(law)
 
+    def seek_rivals(self, say) -> None:
+        """Rivals of the only law, where it leaves more than noise, from short windows as well."""
+        if len(self.taken) != 1 or self.excess() < LEAST_EXCESS:
+            return
+        law = self.taken[0]
+        others = [w for w in self.laws if (w.effect, w.sensor) != (law.effect, law.sensor)]
+        found = rivals_of_short_windows(self.own, self.plain, self.fit, others)
+        for t in found:
+            say(f"  whole recordings: {t.law.key}, begun in short windows, leaves {t.left:.2f}")
+        keys = {t.law.key for t in found}
+        known = [t for t in self.rivals[law.key] if t.law.key not in keys]
+        self.rivals[law.key] = sorted(known + found, key=lambda t: -t.gain)
+        self.first = self.rivals[law.key]
+
     def compare(self, say, last: bool = False) -> None:
         """Each law against its rivals beside the others; the plainest of those alike is taken.
 
@@ -220,10 +236,12 @@ def worth(trial: Trial) -> float:
 def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
-    Every machine has friction: where it explains as much, no dead zone of the drive is named.
+    Every machine has friction: where it explains as much, no dead zone of the drive is named. What
+    a log's uneven rows add to large errors has a share in these, and no law.
     """
-    best = max(map(worth, trials))
-    alike = [t for t in trials if worth(t) > best - doubt]
+    best = max(trials, key=worth)
+    doubt = max(doubt, ALIKE_OF_GAIN * best.gain)
+    alike = [t for t in trials if worth(t) > worth(best) - doubt]
     return min(
         alike, key=lambda t: (t.law.effect == DriveDeadZone.effect, count_values(t.law), -t.gain)
     )
