@@ -43,7 +43,7 @@ def lengthened(found: Found, say, *, quick: bool = False) -> None:
         fit = trial.fit(h, found.best.x, iterations=5)
         error = relative_error(trial, h, fit.x)
         say(f"with laws over {HORIZONS[at + 1] or 'all'} T: error {error:.3g} of the spread")
-        if error > LOST == found.lost and not quick:
+        if found.lost == LOST < error and not quick:  # shorter windows end where they err by more
             trial, fit = _by_output_error(trial, fit, found)
             error = relative_error(trial, h, fit.x)
             say(f"  from output errors: {error:.3g}")
