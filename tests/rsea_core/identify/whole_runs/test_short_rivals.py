@@ -7,7 +7,7 @@ from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
 from tests.cases.one_axis import pendulum_case
 
 
-def test_a_spring_beside_gravity_is_a_rival_of_what_whole_recordings_suggest(tmp_path):
+def test_a_spring_parallel_to_gravity_is_a_rival_of_what_whole_recordings_suggest(tmp_path):
     case = pendulum_case(tmp_path, SpringParallel(stiffness_Nm_per_rad=0.2), seed=2)
     found = begun(case, None, lambda text: None)
     own = in_sensor_noise(found.base_estimator, found.base)
