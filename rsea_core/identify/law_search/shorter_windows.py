@@ -1,4 +1,4 @@
-"""Shorter windows, in which parameters alone predict closely, for another search.
+"""A second search in shorter windows, which parameters alone predict closely.
 
 Near the longest horizon at which a machine is predictable, predictions are far from what is
 measured: a law over the angle acts at the wrong angle there, and the unknown torques that such
@@ -10,7 +10,7 @@ from rsea_core.identify.law_search.candidate_fits import settled
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.coloured_noise import with_coloured_readings
 from rsea_core.identify.multistep.criteria import CLOSER, DOUBTED_ERROR, HORIZONS
-from rsea_core.identify.multistep.estimator import Estimator, independent_share
+from rsea_core.identify.multistep.estimator import independent_share, initial_estimator
 from rsea_core.identify.multistep.horizons import (
     long_enough,
     relative_error,
@@ -19,22 +19,17 @@ from rsea_core.identify.multistep.horizons import (
     with_windows,
 )
 from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS
-from rsea_core.identify.multistep.tracks import block_rows, initial_track
 
 
 def in_shorter_windows(found: Found, say) -> Found | None:
-    """Parameters alone in the longest windows that they predict within `DOUBTED_ERROR`.
+    """Parameters alone in the longest windows in which their error is below `DOUBTED_ERROR`.
 
-    None where they predict all windows up to their horizon so, or none.
+    None if the error is below it at the horizon already, or in no windows.
     """
     h, x = found.base.hypothesis, found.base.x
     if not relative_error(found.base_estimator, h, x) > DOUBTED_ERROR:
         return None
-    problem = found.problem
-    blocks = block_rows(problem.fitted)
-    begun = Estimator(
-        problem, [initial_track(e, b) for e, b in zip(problem.fitted, blocks, strict=True)]
-    )
+    begun = initial_estimator(found.problem)
     smooth(begun, h, x)
     for horizon in reversed(HORIZONS[: HORIZONS.index(found.base_horizon)]):
         if not long_enough(begun, horizon):
@@ -52,12 +47,12 @@ def in_shorter_windows(found: Found, say) -> Found | None:
     own = with_coloured_readings(with_noise(own, h, fit.x), h, fit.x, say)
     own.tempering = independent_share(own, h, fit.x)
     own, base = settled(own, own.fit(h, fit.x))
-    return Found(problem=problem, base_estimator=own, base=base, estimator=own, best=base,
+    return Found(problem=found.problem, base_estimator=own, base=base, estimator=own, best=base,
                  horizon=horizon, base_horizon=horizon, lost=DOUBTED_ERROR)  # fmt: skip
 
 
 def predicts_closer(shorter: Found, found: Found) -> bool:
-    """Whether laws of shorter windows predict those windows clearly better than what was found."""
+    """Whether the laws found in shorter windows halve the error of the first search there."""
     trial = found.estimator.having(with_windows(found.estimator, shorter.horizon))
     h = found.best.hypothesis
     error = relative_error(trial, h, trial.fit(h, found.best.x, iterations=5).x)

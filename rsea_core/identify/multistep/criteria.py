@@ -4,7 +4,7 @@ HORIZONS = (0.1, 0.3, 1.0, 4.0, 16.0, None)
 """Lengths of windows in time scales of the motion; None: the whole recording."""
 LOST = 0.3  # error over the spread of a reading beyond which a horizon is too long
 DOUBTED_ERROR = 0.05  # share of the spread: a larger error of the longest windows is doubted too
-CLOSER = 0.5  # of another search's error in the same windows: laws of shorter windows stand
+CLOSER = 0.5  # of the first search's error: below it, laws found in shorter windows replace it
 DOUBTED_SHARE = 0.4  # of independent innovations, below which no law fits the machine quite
 DEPENDENT = 0.3  # the same, below which values alone do not explain the recordings
 LEAST_ROWS = 10  # of a window
@@ -88,7 +88,7 @@ SOUND_IN_LEFT_NOISE = 1.4  # the same in the noise that the best law leaves
 LEAST_EXCESS = 100.0  # cost above that of noise, from which a law is tried all the same
 SHAPE_SHARE = 0.5  # of the excess of parameters alone: least held-out gain of a shape
 COMPLETE_SHARE = 0.08  # or of what parameters alone leave: small things that every machine has
-ALIKE_OF_GAIN = 3e-4  # of a law's gain in whole recordings, which tells no plainer law from it
+ALIKE_OF_GAIN = 3e-4  # of the gain in whole recordings: laws that differ by less are alike
 DOUBT = 0.1  # of what is left above the noise, in units: by so much rivals are not told apart
 LEAST_OF_LEFT = 0.05  # of what laws gained on whole recordings so far: least gain of a further one
 WHOLE_LAWS, WHOLE_TRIED, WHOLE_FORMS = 3, 24, 3  # laws at most, fitted each time, of one effect

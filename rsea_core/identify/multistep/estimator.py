@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, huber_weights
-from rsea_core.identify.multistep.tracks import Track
+from rsea_core.identify.multistep.tracks import Track, block_rows, initial_track
 
 STEP = 0.02  # of the unknowns, for differences
 MOST_MOVED = 100.0  # root of the sum of squares by which such a step may move the innovations
@@ -312,3 +312,10 @@ def stretches_of(tracks: Sequence[Track]) -> list[NDArray]:
     rows = [t.blocks for t in tracks]
     counts = [max(2, round(STRETCHES * n / sum(rows))) for n in rows]
     return [np.arange(n) * count // n for n, count in zip(rows, counts, strict=True)]
+
+
+def initial_estimator(problem: MultistepProblem) -> Estimator:
+    """All recordings that are fitted, each one run, before anything is known of their noise."""
+    blocks = block_rows(problem.fitted)
+    tracks = [initial_track(e, b) for e, b in zip(problem.fitted, blocks, strict=True)]
+    return Estimator(problem, tracks)

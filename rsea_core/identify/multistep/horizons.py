@@ -43,6 +43,7 @@ from rsea_core.identify.multistep.estimator import (
     Estimate,
     Estimator,
     independent_share,
+    initial_estimator,
 )
 from rsea_core.identify.multistep.experiment import (
     DELAY_STEP_ROWS,
@@ -53,8 +54,6 @@ from rsea_core.identify.multistep.noise_estimate import NOISE_STEPS, estimated_n
 from rsea_core.identify.multistep.tracks import (
     Track,
     about,
-    block_rows,
-    initial_track,
     prepared,
     resmoothed,
     windows_of,
@@ -179,10 +178,7 @@ def _grown(
     problem: MultistepProblem, h: Hypothesis, x: NDArray, say, output_errors: bool
 ) -> tuple[Growth, bool]:
     """Parameters from a start, and whether the longest windows alone showed the command's delay."""
-    blocks = block_rows(problem.fitted)
-    estimator = Estimator(
-        problem, [initial_track(e, b) for e, b in zip(problem.fitted, blocks, strict=True)]
-    )
+    estimator = initial_estimator(problem)
     smooth(estimator, h, x)
     kept, known = None, False
     for horizon in HORIZONS:

@@ -168,7 +168,7 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
         return None
     for trial in _alone(search):
         if trial.law.only is not None:
-            continue  # where something else is left, a torque that acts once can pass for it
+            continue  # a torque that acts once can fit the error of a law that is not known
         explained = 1.0 - excess(own, trial.fit.hypothesis, trial.fit.x) / excess_before
         if explained < EXPLAINED:
             continue
@@ -209,7 +209,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         return found
     own = in_sensor_noise(found.base_estimator, found.base)
     h = found.best.hypothesis
-    fit = converged(own, h, found.best.x)
+    fit = converged(own, h, found.best.x) if found.steps else found.best
     left = misfit(own, h, fit.x) if found.steps else np.inf
     if nearly is not None:
         best = nearly.best

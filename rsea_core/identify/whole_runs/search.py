@@ -143,18 +143,16 @@ class WholeSearch(TakenLaws):
                 self.taken.remove(law)
 
     def seek_rivals(self, say) -> None:
-        """Rivals of the only law, where it leaves more than noise, from short windows as well."""
+        """If the only law leaves more than noise, add rivals that were fitted in short windows."""
         if len(self.taken) != 1 or self.excess() < LEAST_EXCESS:
             return
         law = self.taken[0]
         others = [w for w in self.laws if (w.effect, w.sensor) != (law.effect, law.sensor)]
         found = rivals_of_short_windows(self.own, self.plain, self.fit, others)
         for t in found:
-            say(f"  whole recordings: {t.law.key}, begun in short windows, leaves {t.left:.2f}")
-        keys = {t.law.key for t in found}
-        known = [t for t in self.rivals[law.key] if t.law.key not in keys]
-        self.rivals[law.key] = sorted(known + found, key=lambda t: -t.gain)
-        self.first = self.rivals[law.key]
+            say(f"  whole recordings: {t.law.key}, from short windows, leaves {t.left:.2f}")
+        self.rivals[law.key] = _with_trials(self.rivals[law.key], found)
+        self.first = _with_trials(self.first, found)
 
     def compare(self, say, last: bool = False) -> None:
         """Each law against its rivals beside the others; the plainest of those alike is taken.
@@ -206,6 +204,13 @@ class WholeSearch(TakenLaws):
         )
 
 
+def _with_trials(known: Sequence[Trial], others: Sequence[Trial]) -> list[Trial]:
+    """Known trials and others, which replace those of the same law, best first."""
+    keys = {t.law.key for t in others}
+    kept = [t for t in known if t.law.key not in keys]
+    return sorted([*kept, *others], key=lambda t: -t.gain)
+
+
 def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
     """The best trial of each effect and reading, best first."""
     found: dict[tuple, Trial] = {}
@@ -236,8 +241,8 @@ def worth(trial: Trial) -> float:
 def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
-    Every machine has friction: where it explains as much, no dead zone of the drive is named. What
-    a log's uneven rows add to large errors has a share in these, and no law.
+    Every machine has friction: where it explains as much, no dead zone of the drive is named.
+    Uneven rows of a log leave an error in proportion to the gain, which further values can fit.
     """
     best = max(trials, key=worth)
     doubt = max(doubt, ALIKE_OF_GAIN * best.gain)

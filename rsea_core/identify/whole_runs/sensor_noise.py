@@ -30,8 +30,8 @@ from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_b
 
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
 STEPS = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
-CONVERGED = 60  # iterations at most, of the law that is taken: its minimum may be flat
 MOVES = np.concatenate([-STEPS[::-1], [0.0], STEPS])
+CONVERGED = 60  # iterations at most, of the law that is taken: its minimum may be flat
 
 
 def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estimator:
@@ -127,9 +127,10 @@ def _without_lead(t: Track, late_s: float) -> Track:
 
 
 def converged(own: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
-    """A fit that gains nothing by being started again where it ended.
+    """A fit that is repeated from its end until the cost no longer falls.
 
-    Steps that were once damped stay short, so that a fit in a flat valley stops before its minimum.
+    Damping that was once increased keeps steps short, so that a fit stops early where the cost is
+    flat.
     """
     fit = own.fit(h, x, iterations=CONVERGED)
     for _ in range(SCANS):

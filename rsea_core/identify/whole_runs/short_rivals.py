@@ -1,14 +1,13 @@
-"""Rivals of a law of whole recordings, begun in short windows.
+"""Rivals of a law of whole recordings, fitted in short windows first.
 
-Over many cycles a law that changes the machine's frequency must begin near its value: a fit of
-whole recordings from elsewhere stays in a minimum that is a cycle off, and another law takes its
-place. Short windows have no such minima.
+A law that changes the machine's frequency has a local minimum for each cycle by which a simulation
+of whole recordings is early or late. If its fit ends in one of these, another law seems better.
+Short windows hold too few cycles for such minima.
 """
 
 from collections.abc import Sequence
 
 from rsea_core.effects.variant import Law
-from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
 from rsea_core.identify.law_search.screening import screen
 from rsea_core.identify.multistep.criteria import PER_VALUE, SHORT, WHOLE_RIVALS
@@ -38,9 +37,9 @@ def rivals_of_short_windows(
     better = sorted((pair for pair in rough if pair[1].cost < best.cost), key=lambda p: p[1].cost)
     found = []
     for c, begun in better[:WHOLE_RIVALS]:
-        h: Hypothesis = begun.hypothesis
-        fit = converged(own, h, begun.x)
+        fit = converged(own, begun.hypothesis, begun.x)
         if not at_bound(own.problem, fit, c.law):
             gain = plain.cost - fit.cost - PER_VALUE * count_values(c.law)
-            found.append(Trial(candidate=c, fit=fit, gain=gain, left=misfit(own, h, fit.x)))
+            left = misfit(own, fit.hypothesis, fit.x)
+            found.append(Trial(candidate=c, fit=fit, gain=gain, left=left))
     return found

@@ -1,4 +1,4 @@
-"""A law that changes the machine's frequency is found from short windows, where it is in phase."""
+"""A law that changes the machine's frequency is found in short windows, where it stays in phase."""
 
 from rsea_core.effects.spring_parallel import SpringParallel
 from rsea_core.identify.law_search.search import begun, laws_of
