@@ -16,6 +16,7 @@ from rsea_core.identify.result.corrected_model import FoundModel, heat_left, res
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
+from rsea_core.identify.whole_runs.single_zeros import zeros_of
 from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
@@ -215,7 +216,11 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
     if timing.linear:
         text = "the command moves linearly from row to row of these logs; it is simulated so"
         found.append(Finding(kind=Kind.METHOD, text=text))
-    meshes = any(law.effect == MESH_DAMPER for law in conclusion.fit.hypothesis.laws)
+    fit = conclusion.fit
+    for file, column, size in zeros_of(conclusion.estimator, fit.hypothesis, fit.x):
+        text = f"the zero of {column} differs by {size:.3g} in this recording alone; it is free"
+        found.append(Finding(kind=Kind.METHOD, text=text, file=file, column=column))
+    meshes = any(law.effect == MESH_DAMPER for law in fit.hypothesis.laws)
     if meshes:
         stiffness = conclusion.nominal["spring_stiffness_Nm_per_rad"]
         text = (

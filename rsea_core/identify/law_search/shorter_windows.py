@@ -29,7 +29,7 @@ def in_shorter_windows(found: Found, say) -> Found | None:
     h, x = found.base.hypothesis, found.base.x
     if not relative_error(found.base_estimator, h, x) > DOUBTED_ERROR:
         return None
-    begun = initial_estimator(found.problem)
+    begun = initial_estimator(found.problem, [t.zeros for t in found.base_estimator.tracks])
     smooth(begun, h, x)
     for horizon in reversed(HORIZONS[: HORIZONS.index(found.base_horizon)]):
         if not long_enough(begun, horizon):

@@ -106,6 +106,7 @@ def linear_errors(
     row_s: float,
     noise: Noise,
     time_s: float,
+    zeros: Sequence[int] = (),
 ) -> LinearErrors:
     """The errors' machine on the rows of one recording.
 
@@ -115,11 +116,13 @@ def linear_errors(
         By which gravity's stiffness changes along the rows.
     command_change : (n,) array
         Of the command over each row.
+    zeros : sequence of int
+        Readings whose zero this recording alone has (`Track.zeros`).
     """
     states = moving_states(plant)
     n, p = len(states), len(channels)
     constants = np.full(p, -1)
-    later = [j for j, name in enumerate(channels) if j > 0 and name != "current_A"]
+    later = [j for j, name in enumerate(channels) if j in zeros or _has_zero(plant, name, j == 0)]
     slow = n if k.WW in states else -1
     constants[later] = n + (slow >= 0) + np.arange(len(later))
     d = n + (slow >= 0) + len(later)
@@ -156,6 +159,17 @@ def linear_errors(
     C[np.arange(colours.size), colours] = 1.0
     Q = np.tensordot(noise.sizes**2, unit, axes=1)
     return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow, colours)
+
+
+def _has_zero(plant: mp.Plant, name: str, first: bool) -> bool:
+    """Whether each recording may have its own zero of a reading, of the size of a count.
+
+    The first angle or velocity says where a rigid body is, or what a constant speed is; a current
+    and a torque show what is constant.
+    """
+    if first:
+        return plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD) and name.endswith("angle_rad")
+    return name not in ("current_A", "torque_Nm")
 
 
 def _modes(plant: mp.Plant, load_angle: NDArray) -> NDArray:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, huber_weights
-from rsea_core.identify.multistep.tracks import Track, block_rows, initial_track
+from rsea_core.identify.multistep.tracks import Track, block_rows, initial_track, prepared
 
 STEP = 0.02  # of the unknowns, for differences
 MOST_MOVED = 100.0  # root of the sum of squares by which such a step may move the innovations
@@ -314,8 +314,18 @@ def stretches_of(tracks: Sequence[Track]) -> list[NDArray]:
     return [np.arange(n) * count // n for n, count in zip(rows, counts, strict=True)]
 
 
-def initial_estimator(problem: MultistepProblem) -> Estimator:
-    """All recordings that are fitted, each one run, before anything is known of their noise."""
+def initial_estimator(
+    problem: MultistepProblem, zeros: Sequence[tuple[int, ...]] | None = None
+) -> Estimator:
+    """All recordings that are fitted, each one run, before anything is known of their noise.
+
+    Parameters
+    ----------
+    zeros : sequence of tuple of int
+        `Track.zeros` of each recording; None: none.
+    """
     blocks = block_rows(problem.fitted)
     tracks = [initial_track(e, b) for e, b in zip(problem.fitted, blocks, strict=True)]
+    if zeros is not None:
+        tracks = [prepared(t, zeros=own) for t, own in zip(tracks, zeros, strict=True)]
     return Estimator(problem, tracks)

@@ -43,6 +43,8 @@ class Track:
         are out of phase after ten cycles.
     windows : Windows or None
         None: one run from the first row.
+    zeros : tuple of int
+        Readings whose zero differs in this recording alone (`whole_runs.single_zeros`).
     """
 
     experiment: Experiment
@@ -61,6 +63,7 @@ class Track:
     block: int  # rows averaged to one
     seen: float = 1.0  # share of the rows, from the first on, that count
     lead: int = 0  # first rows that do not count
+    zeros: tuple[int, ...] = ()
 
     @property
     def blocks(self) -> int:
@@ -106,7 +109,7 @@ def prepared(track: Track, **changes) -> Track:
     errors = linear_errors(
         t.plant, t.stiffness, e.channels, t.averaged(t.motion)[:, k.TL],
         t.averaged(e.command_change[:, None] ** 2)[:, 0] ** 0.5 / t.block**0.5,
-        e.recording.sample_time_s * t.block, t.noise, t.scale.time_s,
+        e.recording.sample_time_s * t.block, t.noise, t.scale.time_s, t.zeros,
     )  # fmt: skip
     begins = np.zeros(t.blocks, bool)
     begins[t.windows.rows[:, 0] // t.block] = True
@@ -140,8 +143,9 @@ def start_variances(t: Track, errors: LinearErrors) -> NDArray:
     if errors.slow >= 0:
         start[:, errors.slow] = t.noise.inputs[3] ** 2
     for j, at in enumerate(errors.constants):
-        if at >= 0 and t.experiment.channels[j] != "torque_Nm":  # has no unknown zero angle
-            start[:, at] = t.experiment.floor_of_each[j] ** 2
+        if at >= 0:
+            own = np.std(t.experiment.measured[:, j])
+            start[:, at] = (own if j in t.zeros else t.experiment.floor_of_each[j]) ** 2
     start[:, errors.colours] = t.noise.colours**2
     return np.maximum(start, 1e-30)
 
@@ -355,13 +359,22 @@ def _extent(scale: Scale, motion: NDArray) -> NDArray:
     return np.array([current, angle, speed, angle, speed])
 
 
-def from_rest(track: Track) -> Track:
-    """The track with a first window that starts without speed, where the recording says so."""
+def from_rest(track: Track, *, certain: bool = True) -> Track:
+    """The track with a first window that starts without speed, where the recording says so.
+
+    Parameters
+    ----------
+    certain : bool
+        Whether the start's speed is known to be zero, or as well as the smoothed motion.
+    """
     e = track.experiment
     if not e.at_rest:
         return track
-    motion, spread = track.windows.motion.copy(), track.motion_std.copy()
-    motion[0, [k.WW, k.WL]], spread[0, [k.WW, k.WL]] = 0.0, 0.0
+    motion, spread = track.windows.motion.copy(), track.motion_std
+    motion[0, [k.WW, k.WL]] = 0.0
+    if certain:
+        spread = spread.copy()
+        spread[0, [k.WW, k.WL]] = 0.0
     return prepared(track, windows=replace(track.windows, motion=motion), motion_std=spread)
 
 

@@ -40,6 +40,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     misfit,
     well_fitted,
 )
+from rsea_core.identify.whole_runs.single_zeros import with_single_zeros
 from rsea_core.identify.whole_runs.taken_laws import Trial
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
@@ -60,6 +61,10 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     """
     own = in_sensor_noise(found.base_estimator, found.base)
     plain, left = _parameters_alone(own, found.base)
+    other = with_single_zeros(found, own, plain, say)
+    if other is not found:
+        found, own = other, in_sensor_noise(other.base_estimator, other.base)
+        plain, left = _parameters_alone(own, found.base)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
     if left <= SOUND and is_coloured(found.base_estimator):

@@ -25,7 +25,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import with_windows
 from rsea_core.identify.multistep.kalman_filter import huber_squares
-from rsea_core.identify.multistep.tracks import Track, prepared
+from rsea_core.identify.multistep.tracks import Track, from_rest, prepared
 from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_by_counts, count_of
 
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
@@ -50,7 +50,7 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
     late_s = 0.0 if fit is None else _delay_s(estimator, fit)
     tracks = []
     for t in with_windows(estimator, None):
-        t = _without_lead(t, late_s)
+        t = from_rest(_without_lead(t, late_s), certain=False)
         noise, readings = t.noise, t.noise.readings
         if _of_sensor(t):
             readings = np.hypot(readings, noise.colours)
