@@ -79,6 +79,29 @@ class Scale:
     time_s: float
 
 
+class Readings(NamedTuple):
+    """What a recording reads, and which of it has a zero that differs there alone."""
+
+    channels: tuple[str, ...]
+    zeros: tuple[int, ...] = ()
+
+    def with_zeros(self, plant: mp.Plant) -> list[int]:
+        """Readings whose zero is a state: those, and others within the size of a count.
+
+        The first angle or velocity says where a rigid body is, or what a constant speed is; a
+        current and a torque show what is constant.
+        """
+        elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
+        found = []
+        for j, name in enumerate(self.channels):
+            small = name not in ("current_A", "torque_Nm")
+            if j == 0:
+                small = elastic and name.endswith("angle_rad")
+            if small or j in self.zeros:
+                found.append(j)
+        return found
+
+
 class LinearErrors(NamedTuple):
     """A (modes, d, d), Q (modes, d, d), mode (n,), C (p, d), start (d,) of standard deviations.
 
@@ -100,13 +123,12 @@ class LinearErrors(NamedTuple):
 def linear_errors(
     plant: mp.Plant,
     stiffness: float,
-    channels: Sequence[str],
+    readings: Readings,
     load_angle: NDArray,
     command_change: NDArray,
     row_s: float,
     noise: Noise,
     time_s: float,
-    zeros: Sequence[int] = (),
 ) -> LinearErrors:
     """The errors' machine on the rows of one recording.
 
@@ -116,13 +138,11 @@ def linear_errors(
         By which gravity's stiffness changes along the rows.
     command_change : (n,) array
         Of the command over each row.
-    zeros : sequence of int
-        Readings whose zero this recording alone has (`Track.zeros`).
     """
     states = moving_states(plant)
-    n, p = len(states), len(channels)
+    n, p = len(states), len(readings.channels)
     constants = np.full(p, -1)
-    later = [j for j, name in enumerate(channels) if j in zeros or _has_zero(plant, name, j == 0)]
+    later = readings.with_zeros(plant)
     slow = n if k.WW in states else -1
     constants[later] = n + (slow >= 0) + np.arange(len(later))
     d = n + (slow >= 0) + len(later)
@@ -153,23 +173,12 @@ def linear_errors(
         for m, density in enumerate(densities):
             A[j], unit[m, j] = discretised(M, density, row_s)
     A, unit, mode = _with_levels(A, unit, mode, command_change)
-    C = np.array([_reading(plant, stiffness, name, states, d) for name in channels])
+    C = np.array([_reading(plant, stiffness, name, states, d) for name in readings.channels])
     for j in later:
         C[j, constants[j]] = 1.0
     C[np.arange(colours.size), colours] = 1.0
     Q = np.tensordot(noise.sizes**2, unit, axes=1)
     return LinearErrors(A, Q, mode, C, tuple(states), constants, unit, slow, colours)
-
-
-def _has_zero(plant: mp.Plant, name: str, first: bool) -> bool:
-    """Whether each recording may have its own zero of a reading, of the size of a count.
-
-    The first angle or velocity says where a rigid body is, or what a constant speed is; a current
-    and a torque show what is constant.
-    """
-    if first:
-        return plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD) and name.endswith("angle_rad")
-    return name not in ("current_A", "torque_Nm")
 
 
 def _modes(plant: mp.Plant, load_angle: NDArray) -> NDArray:
@@ -272,6 +281,22 @@ def _inputs(plant: mp.Plant, states: Sequence[int], size: NDArray, time_s: float
         if state in states:
             density[states.index(state), states.index(state)] = rate**2 * time_s
     return density
+
+
+def free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str]]:
+    """Which unknown inputs a machine has whose densities its readings can tell."""
+    found = []
+    if plant.structure != mp.RIGID_HELD:
+        found.append((0, "torque at the gear"))
+        if plant.drive != mp.POSITION:  # lasting errors of a servo show its friction
+            found.append((3, "slow torque at the gear"))
+    if plant.structure == mp.ELASTIC_FREE:
+        found.append((1, "torque at the load"))
+    if plant.drive in (mp.DUTY, mp.VOLTAGE) and "current_A" in channels:
+        found.append((2, "voltage"))
+    if plant.structure != mp.RIGID_HELD and plant.drive != mp.POSITION:
+        found.append((4, "command within a row"))
+    return found
 
 
 def discretised(M: NDArray, density: NDArray, h: float) -> tuple[NDArray, NDArray]:

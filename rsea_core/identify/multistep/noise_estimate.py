@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import machine_of
 from rsea_core.identify.multistep.criteria import MOST_COLOUR
-from rsea_core.identify.multistep.error_filter import Noise, with_density
+from rsea_core.identify.multistep.error_filter import Noise, free_inputs, with_density
 from rsea_core.identify.multistep.kalman_filter import (
     Filter,
     filter_gains,
     huber_squares,
     innovations,
 )
-from rsea_core.identify.multistep.tracks import Track, free_inputs, prepared, start_variances
+from rsea_core.identify.multistep.tracks import Track, prepared, start_variances
 from rsea_core.numeric.threads import share_out
 
 MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would pass for it

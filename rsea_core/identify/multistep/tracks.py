@@ -14,7 +14,9 @@ from rsea_core.identify.fitting.problem import Hypothesis, machine_of
 from rsea_core.identify.multistep.error_filter import (
     LinearErrors,
     Noise,
+    Readings,
     Scale,
+    free_inputs,
     linear_errors,
 )
 from rsea_core.identify.multistep.experiment import Experiment
@@ -27,6 +29,7 @@ WIDEST = 10.0  # typical magnitudes: a start's deviation at most
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
 MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
 ROWS_PER_CYCLE = 12.0  # of the fastest mode
+START_ERROR = 0.01  # of an angle's spread: a smoothed start that is further off is not taken
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -107,9 +110,9 @@ def prepared(track: Track, **changes) -> Track:
     t = replace(track, **changes)
     e = t.experiment
     errors = linear_errors(
-        t.plant, t.stiffness, e.channels, t.averaged(t.motion)[:, k.TL],
+        t.plant, t.stiffness, Readings(e.channels, t.zeros), t.averaged(t.motion)[:, k.TL],
         t.averaged(e.command_change[:, None] ** 2)[:, 0] ** 0.5 / t.block**0.5,
-        e.recording.sample_time_s * t.block, t.noise, t.scale.time_s, t.zeros,
+        e.recording.sample_time_s * t.block, t.noise, t.scale.time_s,
     )  # fmt: skip
     begins = np.zeros(t.blocks, bool)
     begins[t.windows.rows[:, 0] // t.block] = True
@@ -365,30 +368,33 @@ def from_rest(track: Track, *, certain: bool = True) -> Track:
     Parameters
     ----------
     certain : bool
-        Whether the start's speed is known to be zero, or as well as the smoothed motion.
+        Whether the speed is known to be zero, or as well as the smoothed motion. If not, an angle
+        that this misses by `START_ERROR` begins as it is read.
     """
     e = track.experiment
     if not e.at_rest:
         return track
-    motion, spread = track.windows.motion.copy(), track.motion_std
+    motion, spread = track.windows.motion.copy(), track.motion_std.copy()
     motion[0, [k.WW, k.WL]] = 0.0
     if certain:
-        spread = spread.copy()
         spread[0, [k.WW, k.WL]] = 0.0
+    else:
+        _begin_as_read(e, motion, spread)
     return prepared(track, windows=replace(track.windows, motion=motion), motion_std=spread)
 
 
-def free_inputs(plant: mp.Plant, channels: Sequence[str]) -> list[tuple[int, str]]:
-    """Which unknown inputs a machine has whose densities its readings can tell."""
-    found = []
-    if plant.structure != mp.RIGID_HELD:
-        found.append((0, "torque at the gear"))
-        if plant.drive != mp.POSITION:  # lasting errors of a servo show its friction
-            found.append((3, "slow torque at the gear"))
-    if plant.structure == mp.ELASTIC_FREE:
-        found.append((1, "torque at the load"))
-    if plant.drive in (mp.DUTY, mp.VOLTAGE) and "current_A" in channels:
-        found.append((2, "voltage"))
-    if plant.structure != mp.RIGID_HELD and plant.drive != mp.POSITION:
-        found.append((4, "command within a row"))
-    return found
+def _begin_as_read(e: Experiment, motion: NDArray, spread: NDArray) -> None:
+    """Put the first row's angles where they are read, if a model that lacks a law bent them.
+
+    The motor's sensor says where a rigid body is.
+    """
+    rigid = machine_of(e.base).structure == mp.RIGID_FREE
+    for name, state, ratio in (
+        ("load_angle_rad", k.TL, 1.0), ("motor_angle_rad", k.TW, e.where.ratio),
+    ):  # fmt: skip
+        if name not in e.channels or e.recording.load.is_held:
+            continue
+        read = e.recording[name] / ratio
+        if abs(motion[0, state] - read[0]) > START_ERROR * np.std(read):
+            states = [k.TW, k.TL] if rigid else [state]
+            motion[0, states], spread[0, states] = read[0], e.floors[name] / ratio

@@ -63,8 +63,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     plain, left = _parameters_alone(own, found.base)
     other = with_single_zeros(found, own, plain, say)
     if other is not found:
-        found, own = other, in_sensor_noise(other.base_estimator, other.base)
-        plain, left = _parameters_alone(own, found.base)
+        return with_whole_runs(other, say, again=again)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
     if left <= SOUND and is_coloured(found.base_estimator):
@@ -79,6 +78,9 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         if search.left() <= search.enough or not search.add(say):
             break
         search.prune(say)
+        other = with_single_zeros(found, own, search.fit, say)
+        if other is not found:
+            return with_whole_runs(other, say, again=again)
     if search.left() <= search.enough:
         search.refine(say)
         search.seek_rivals(say)

@@ -243,10 +243,18 @@ def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
 
     Every machine has friction: where it explains as much, no dead zone of the drive is named.
     Uneven rows of a log leave an error in proportion to the gain, which further values can fit.
+    Of equally plain laws that one is taken which keeps the machine closest to its rig file: two
+    encoders that disagree by a factor do not tell which of them is wrong.
     """
     best = max(trials, key=worth)
     doubt = max(doubt, ALIKE_OF_GAIN * best.gain)
     alike = [t for t in trials if worth(t) > worth(best) - doubt]
     return min(
-        alike, key=lambda t: (t.law.effect == DriveDeadZone.effect, count_values(t.law), -t.gain)
+        alike,
+        key=lambda t: (
+            t.law.effect == DriveDeadZone.effect,
+            count_values(t.law),
+            t.fit.prior_cost,
+            -t.gain,
+        ),
     )

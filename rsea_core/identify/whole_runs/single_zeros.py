@@ -31,7 +31,7 @@ def with_single_zeros(found: Found, own: Estimator, fit: Estimate, say) -> Found
     own : Estimator
         Of whole recordings in the sensors' noise.
     fit : Estimate
-        Parameters alone.
+        What shows the zeros, with laws or without.
     """
     zeros = single_zeros(own, fit)
     if not zeros:
@@ -42,9 +42,10 @@ def with_single_zeros(found: Found, own: Estimator, fit: Estimate, say) -> Found
         say(f"the zero of {e.channels[j]} differs in {e.recording.file} alone")
         tracks[at] = prepared(tracks[at], zeros=(*tracks[at].zeros, j))
     estimator = found.base_estimator.having(tracks)
-    smooth(estimator, fit.hypothesis, found.base.x)
+    h, x = found.base.hypothesis, found.base.x
+    smooth(estimator, h, x)
     estimator = estimator.having([prepared(t) for t in estimator.tracks])
-    estimator, base = settled(estimator, estimator.fit(fit.hypothesis, found.base.x))
+    estimator, base = settled(estimator, estimator.fit(h, x))
     return replace(found, base_estimator=estimator, estimator=estimator, base=base, best=base)
 
 

@@ -9,7 +9,7 @@ from rsea_core.identify.multistep.estimator import Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, innovations, smoothed
 from rsea_core.identify.multistep.noise_estimate import estimated_noise
-from rsea_core.identify.multistep.tracks import initial_track, start_variances
+from rsea_core.identify.multistep.tracks import initial_track, prepared, start_variances
 from rsea_core.recordings.case import Case
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 from tests.cases.planted import RIG, recording
@@ -108,4 +108,9 @@ def test_readings_begin_with_an_unknown_zero_except_that_of_a_torque_sensor(tmp_
     floors = dict(zip(experiment.channels, experiment.floor_of_each, strict=True))
     zero = dict(zip(experiment.channels, track.errors.constants, strict=True))
     assert start[zero["load_angle_rad"]] == pytest.approx(floors["load_angle_rad"] ** 2)
-    assert start[zero["torque_Nm"]] < 1e-12 * floors["torque_Nm"] ** 2
+    assert zero["torque_Nm"] == -1
+    track = prepared(track, zeros=(experiment.channels.index("torque_Nm"),))
+    zero = dict(zip(experiment.channels, track.errors.constants, strict=True))
+    (start,) = start_variances(track, track.errors)
+    spread = np.var(experiment.measured[:, experiment.channels.index("torque_Nm")])
+    assert start[zero["torque_Nm"]] == pytest.approx(spread)
