@@ -384,7 +384,7 @@ def from_rest(track: Track, *, certain: bool = True) -> Track:
 
 
 def _begin_as_read(e: Experiment, motion: NDArray, spread: NDArray) -> None:
-    """Put the first row's angles where they are read, if a model that lacks a law bent them.
+    """Put the first row's angles where they are read, if a model that lacks a law moved them.
 
     The motor's sensor says where a rigid body is.
     """

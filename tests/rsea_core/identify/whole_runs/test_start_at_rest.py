@@ -33,7 +33,7 @@ def test_the_smoothed_speed_of_a_start_at_rest_is_not_taken(initial_rest):
 
 
 @pytest.mark.parametrize("off", [0.002, 0.05])
-def test_an_angle_that_a_lacking_model_bent_begins_as_it_is_read(off):
+def test_an_angle_far_from_the_smoothed_one_begins_as_it_is_read(off):
     """Shares of its spread; what is within a hundredth may be a zero of the encoder."""
     _, columns = recorded(ActuatorModel(WITHOUT_ANCHORS), TIME, PENDULUM, duty=multisine(TIME))
     r = Recording(file="rec.csv", role="identification", load=PENDULUM, columns=columns,
