@@ -6,6 +6,7 @@ import numpy as np
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
+from rsea_core.files.csv_columns import unit_of
 from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.gear_mesh import as_effect
@@ -216,11 +217,8 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
     if timing.linear:
         text = "the command moves linearly from row to row of these logs; it is simulated so"
         found.append(Finding(kind=Kind.METHOD, text=text))
-    fit = conclusion.fit
-    for file, column, size in zeros_of(conclusion.estimator, fit.hypothesis, fit.x):
-        text = f"the zero of {column} differs by {size:.3g} in this recording alone; it is free"
-        found.append(Finding(kind=Kind.METHOD, text=text, file=file, column=column))
-    meshes = any(law.effect == MESH_DAMPER for law in fit.hypothesis.laws)
+    found += _zeros(conclusion)
+    meshes = any(law.effect == MESH_DAMPER for law in conclusion.fit.hypothesis.laws)
     if meshes:
         stiffness = conclusion.nominal["spring_stiffness_Nm_per_rad"]
         text = (
@@ -250,6 +248,18 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
             " leaves the recordings, and laws were judged in windows of that length"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
+    return found
+
+
+def _zeros(conclusion: WindowVerdict) -> list[Finding]:
+    """Zeros that one recording alone has."""
+    fit, found = conclusion.fit, []
+    for file, column, size in zeros_of(conclusion.estimator, fit.hypothesis, fit.x):
+        text = (
+            f"the zero of {column} differs by {size:.3g} {unit_of(column)} in this recording alone;"
+            " the simulation allows for it"
+        )
+        found.append(Finding(kind=Kind.METHOD, text=text, file=file, column=column))
     return found
 
 
