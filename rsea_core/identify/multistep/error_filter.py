@@ -80,16 +80,16 @@ class Scale:
 
 
 class Readings(NamedTuple):
-    """What a recording reads, and which of it has a zero that differs there alone."""
+    """Columns of a recording, and indices of those whose zero differs in this recording alone."""
 
     channels: tuple[str, ...]
     zeros: tuple[int, ...] = ()
 
     def with_zeros(self, plant: mp.Plant) -> list[int]:
-        """Readings whose zero is a state: those, and others within the size of a count.
+        """Readings whose zero is a state: those, and others that may err by a count.
 
-        The first angle or velocity says where a rigid body is, or what a constant speed is; a
-        current and a torque show what is constant.
+        The first reading is the reference for the angle of a rigid body, or for the speed. A free
+        zero of a current or a torque would absorb the offset of a sensor.
         """
         elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
         found = []

@@ -11,6 +11,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.effects.variant import TrialMachine
 from rsea_core.identify.fitting.predictions import Windows
 from rsea_core.identify.fitting.problem import Hypothesis, machine_of
+from rsea_core.identify.multistep.criteria import START_ERROR
 from rsea_core.identify.multistep.error_filter import (
     LinearErrors,
     Noise,
@@ -29,7 +30,6 @@ WIDEST = 10.0  # typical magnitudes: a start's deviation at most
 LOOSE = 4.0  # a start's variance in units of the smoother's: it serves the same rows twice
 MOST_BLOCKS, LEAST_BLOCKS = 12000, 400  # of averaged rows: of all recordings, of each
 ROWS_PER_CYCLE = 12.0  # of the fastest mode
-START_ERROR = 0.01  # of an angle's spread: a smoothed start that is further off is not taken
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -368,8 +368,8 @@ def from_rest(track: Track, *, certain: bool = True) -> Track:
     Parameters
     ----------
     certain : bool
-        Whether the speed is known to be zero, or as well as the smoothed motion. If not, an angle
-        that this misses by `START_ERROR` begins as it is read.
+        Whether the speed is exactly zero. If not, it keeps the deviation of the smoothed motion,
+        and an angle that this motion misses by `START_ERROR` begins as it is read.
     """
     e = track.experiment
     if not e.at_rest:
@@ -384,9 +384,9 @@ def from_rest(track: Track, *, certain: bool = True) -> Track:
 
 
 def _begin_as_read(e: Experiment, motion: NDArray, spread: NDArray) -> None:
-    """Put the first row's angles where they are read, if a model that lacks a law moved them.
+    """Replace angles of the first row by readings where smoothing with a wrong model moved them.
 
-    The motor's sensor says where a rigid body is.
+    The reference for the angle of a rigid body is the motor's sensor.
     """
     rigid = machine_of(e.base).structure == mp.RIGID_FREE
     for name, state, ratio in (

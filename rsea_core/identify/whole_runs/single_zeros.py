@@ -1,8 +1,8 @@
 """Readings whose zero differs in one recording (docs/diagnosis.md 10.4).
 
-An amplifier that was switched on anew, or a sensor that was mounted again, reads zero elsewhere in
-one recording. No law of the machine says so: an offset acts in every recording and a drift grows.
-The zero of such a reading is a state of the error model in that recording.
+The zero of a sensor can change when its amplifier is restarted or the sensor is mounted again. No
+law of the machine explains that: an offset acts in every recording, and a drift grows. The zero of
+such a reading is a state of the error model in that recording.
 """
 
 from dataclasses import replace
@@ -46,16 +46,22 @@ def with_single_zeros(found: Found, own: Estimator, fit: Estimate, say) -> Found
     smooth(estimator, h, x)
     estimator = estimator.having([prepared(t) for t in estimator.tracks])
     estimator, base = settled(estimator, estimator.fit(h, x))
-    return replace(found, base_estimator=estimator, estimator=estimator, base=base, best=base)
+    return replace(
+        found.without_laws(), base_estimator=estimator, estimator=estimator, base=base, best=base
+    )
 
 
 def single_zeros(own: Estimator, fit: Estimate) -> list[Zero]:
-    """Zeros that explain most of what a fit leaves of a reading in one recording and no other."""
+    """Zeros that explain most of what a fit leaves of a reading in one recording and no other.
+
+    A reading has at most one such zero: one that differs in several recordings may be a law's.
+    """
     residuals = own.residuals([(fit.hypothesis, fit.x)])
+    known = {t.experiment.channels[j] for t in own.tracks for j in t.zeros}
     falls: dict[str, list[tuple[float, Zero]]] = {}
     for at, (t, residual) in enumerate(zip(own.tracks, residuals, strict=True)):
         for j, name in enumerate(t.experiment.channels):
-            if not name.endswith("angle_rad"):  # an angle is read from where a recording begins
+            if name not in known and not name.endswith("angle_rad"):  # angles have them anyway
                 falls.setdefault(name, []).append((_fall(t, residual, j), (at, j)))
     found = []
     for each in falls.values():

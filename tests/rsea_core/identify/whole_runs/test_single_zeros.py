@@ -23,7 +23,7 @@ ZERO_Nm = 0.1  # five deviations of the sensor
 
 
 def begun(zeros):
-    """Parameters alone of a bench whose torque sensor has an own zero in each recording."""
+    """Parameters alone of a bench whose torque sensor has a zero of its own in each recording."""
     made = []
     for j, zero in enumerate(zeros):
         duty = multisine(TIME)[:: 1 if j else -1]
@@ -49,11 +49,12 @@ def test_a_zero_of_one_recording_is_named_and_held_by_the_error_model():
     again = in_sensor_noise(other.base_estimator, other.base)
     trial = [(other.base.hypothesis, other.base.x)]
     left = again.residuals(trial)[1][0][:, at]
-    assert np.mean(left) == pytest.approx(ZERO_Nm, abs=0.01)  # no parameter took its part
+    assert np.mean(left) == pytest.approx(ZERO_Nm, abs=0.01)  # no parameter absorbed it
     white = again.innovations(trial)[1][0][:, at]
     assert abs(np.mean(white[50:])) < 0.3
     assert np.std(white[50:]) < 1.3
     assert [t.zeros for t in again.tracks] == [(), (at,)]
+    assert single_zeros(again, other.base) == []  # a reading has at most one
     ((file, column, size),) = zeros_of(again, *trial[0])
     assert (file, column) == ("rec1.csv", TORQUE)
     assert size == pytest.approx(ZERO_Nm, abs=0.01)

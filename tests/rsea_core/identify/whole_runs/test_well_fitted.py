@@ -33,9 +33,9 @@ def test_a_fit_whose_swing_is_cycles_early_finds_the_right_one(swinging):
     own, best = swinging
     x = best.x.copy()
     x[[p.key for p in own.problem.nominals].index("load_inertia_kgm2")] += 30.0  # its upper bound
-    stuck = own.fit(best.hypothesis, x, iterations=0)  # whether steps leave it depends on round-off
-    found = well_fitted(own, stuck)
-    left = [misfit(own, f.hypothesis, f.x) for f in (best, stuck, found)]
+    early = own.fit(best.hypothesis, x, iterations=0)  # whether steps leave it depends on round-off
+    found = well_fitted(own, early)
+    left = [misfit(own, f.hypothesis, f.x) for f in (best, early, found)]
     assert left[0] < 1.2
     assert left[1] > 10.0
     assert left[2] < 1.2
