@@ -24,7 +24,6 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_RATIO,
     NO_PREDICTION,
     NOT_BEYOND,
-    OUTLIER,
     PER_VALUE,
     RIVAL_SCALE,
     RIVAL_SHARE,
@@ -40,6 +39,7 @@ from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.window_confidence import step_confidence, step_presence
+from rsea_core.identify.window_findings import stands
 from rsea_core.identify.window_fit import (
     FoundFit,
     FoundSearch,
@@ -54,9 +54,7 @@ from rsea_core.identify.window_formula import gain_over_named, unnamed_formula
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
-from rsea_core.recordings.finding import Finding, Kind
-
-ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
+from rsea_core.recordings.finding import Finding
 
 
 class WindowVerdict(Conclusion):
@@ -267,17 +265,12 @@ class WindowVerdict(Conclusion):
         return tuple(f for f in super().data_errors() if self.stands(f))
 
     def stands(self, finding: Finding) -> bool:
-        """Whether a finding about rows is borne out by the innovations of the model found."""
-        if finding.kind is Kind.INITIAL_MOTION:
-            return False  # starts are estimated here
-        if finding.kind not in ROWS:
-            return True
-        for t, e in zip(self.estimator.tracks, self._innovations, strict=True):
-            r = t.experiment
-            if r.recording.file == finding.file and finding.column in r.channels:
-                j = r.channels.index(finding.column)
-                return bool(np.max(np.abs(e[0][:, j])) > OUTLIER)
-        return False
+        """Whether the model found confirms a finding (`window_findings.stands`)."""
+        wrong = {law.sensor for law in self.fit.hypothesis.laws}
+        return stands(
+            finding, self.estimator.tracks, self._innovations, complete=self.found.complete,
+            wrong_sensors=wrong,
+        )  # fmt: skip
 
     @cached_property
     def _innovations(self) -> list[NDArray]:
