@@ -21,6 +21,7 @@ from rsea_core.identify.multistep.criteria import (
     EVENT,
     FAR_FROM_RIG,
     FASTEST,
+    MOST_FITTED_RISE,
     MOST_OF_ONE,
     MOVES,
     NEAR,
@@ -270,23 +271,26 @@ def _equal_shares(share: NDArray, least: int) -> NDArray:
 
 
 def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
-    """Whether a value of the last law ran into a bound that is not its absence.
+    """Whether a value of a law ran into a bound that is not its absence.
 
-    A winding above `MOST_RISE_K` counts as such: its resistance grows with its temperature without
+    A winding far above `MOST_RISE_K` counts as such: its resistance grows with its temperature without
     limit (thermal runaway), and the law can then follow any mismatch.
     """
     if values_at_bound(problem, fit, law):
         return True
     if law.effect != DriveThermal.effect:
         return False
-    return not peak_rise_K(problem, fit.hypothesis, fit.x, problem.benches) < MOST_RISE_K
+    most_K = MOST_FITTED_RISE * MOST_RISE_K
+    return not peak_rise_K(problem, fit.hypothesis, fit.x, problem.benches) < most_K
 
 
 def values_at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> tuple[str, ...]:
-    """Names of the last law's values that ran into a bound which is not its absence."""
-    low, high = problem.bounds(fit.hypothesis)
-    count = count_values(law)
-    x, low, high = fit.x[-count:], low[-count:], high[-count:]
+    """Names of a law's values that ran into a bound which is not its absence."""
+    laws = fit.hypothesis.laws
+    begin = len(problem.nominals) + sum(count_values(w) for w in laws[: laws.index(law)])
+    own = slice(begin, begin + count_values(law))
+    low, high = (limit[own] for limit in problem.bounds(fit.hypothesis))
+    x = fit.x[own]
     stopped = (x >= high - 1e-6) | ((x <= low + 1e-6) & (low != 0.0))
     free = [p for p in law.unknowns if p.scale > 0.0]
     return tuple(p.name for p, at in zip(free, stopped, strict=True) if at and not p.closed)

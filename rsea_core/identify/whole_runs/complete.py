@@ -24,6 +24,7 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_SHARE,
     SOUND,
     SOUND_IN_LEFT_NOISE,
+    TOGETHER,
     UNPREDICTED,
     WHOLE_LAWS,
 )
@@ -81,6 +82,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
             return with_whole_runs(other, say, again=again)
+    search = search.begun_beyond(say) or search
     if search.left() <= search.enough:
         search.refine(say)
         search.seek_rivals(say)
@@ -168,11 +170,14 @@ def _with_other_timing(
 
 
 def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
-    """The first law that alone explains most of what parameters leave, of rows unseen too."""
+    """Laws that explain most of what parameters leave, of rows unseen too: together, or one alone."""
     own, plain = search.own, search.plain
     excess_before = excess(own, plain.hypothesis, plain.x)
     if excess_before == 0.0:  # one reading is not predicted, and others better than their noise
         return None
+    together = _nearly_complete_together(found, search, excess_before, say)
+    if together is not None:
+        return together
     for trial in _alone(search):
         if trial.law.only is not None:
             continue  # a torque that acts once can fit the error of a law that is not known
@@ -188,6 +193,41 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
             search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
             return replace(_complete(found, search), explained=explained)
     return None
+
+
+def _nearly_complete_together(
+    found: Found, search: WholeSearch, excess_before: float, say
+) -> Found | None:
+    """All laws taken, if they leave little and each explains most of what the others leave.
+
+    What is left may be an error of the log that no law describes, as of uneven time stamps.
+    """
+    if not _leaves_little(search, excess_before):
+        return None
+    search.refine(say)
+    search.compare(say)
+    search.predict(say)
+    if not _leaves_little(search, excess_before):
+        return None
+    own, left = search.own, search.excess()
+    for law in search.taken:
+        less = without(own, search.fit, law)
+        if left > (1.0 - EXPLAINED) * excess(own, less.hypothesis, less.x):
+            say(f"  whole recordings: {law.key} explains little of what the others leave")
+            return None
+    unseen = unseen_share(found, own, search.fit, search.plain, say)
+    explained = 1.0 - max(left / excess_before, unseen)
+    if explained < EXPLAINED:
+        return None
+    say(f"  whole recordings: together these laws explain {explained:.3f} of what is left")
+    return replace(_complete(found, search), explained=explained)
+
+
+def _leaves_little(search: WholeSearch, excess_before: float) -> bool:
+    """Whether several lasting laws leave a small share of what parameters leave."""
+    lasting = all(law.only is None for law in search.taken)
+    several = len(search.taken) > 1
+    return several and lasting and search.excess() < (1.0 - TOGETHER) * excess_before
 
 
 def _alone(search: WholeSearch) -> list[Trial]:

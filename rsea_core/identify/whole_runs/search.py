@@ -119,15 +119,54 @@ class WholeSearch(TakenLaws):
     def fitted(
         self, base: Estimate, candidates: Sequence[Candidate], iterations: int = 8
     ) -> list[Trial]:
-        """Candidates fitted beside a fit, best first."""
-        found = []
+        """Candidates fitted beside a fit, best first; without those that end at a bound.
+
+        The best of these is kept (`beyond`) where it would be the first law taken.
+        """
+        found, bounded = [], []
         for c in candidates:
             fit = fitted(self.own, base, c, factors=SIZES, iterations=iterations)
             gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
-            if np.isfinite(gain) and not at_bound(self.own.problem, fit, c.law):
+            if np.isfinite(gain):
                 left = misfit(self.own, fit.hypothesis, fit.x)
-                found.append(Trial(candidate=c, fit=fit, gain=gain, left=left))
-        return sorted(found, key=lambda t: -t.gain)
+                ends = bounded if at_bound(self.own.problem, fit, c.law) else found
+                ends.append(Trial(candidate=c, fit=fit, gain=gain, left=left))
+        found.sort(key=lambda t: -t.gain)
+        if not self.taken and bounded:
+            best = max(bounded, key=lambda t: t.gain)
+            self.beyond = best if not found or best.gain > found[0].gain else None
+        return found
+
+    def add_all(self, say) -> None:
+        """Take laws until what they leave is small enough, or none lowers the error further."""
+        for _ in range(WHOLE_LAWS - len(self.taken)):
+            if self.left() <= self.enough or not self.add(say):
+                return
+            self.prune(say)
+
+    def begun_beyond(self, say) -> "WholeSearch | None":
+        """A search that begins with a law that fitted best alone, but at a bound.
+
+        Alone, a law takes the part of another one that is missing too: a winding that gets hotter
+        than any insulation, where friction is not known yet. None where there is no such law,
+        where the search leaves no less than this one, or where a law stays at a bound.
+        """
+        if self.beyond is None or self.left() <= self.enough:
+            return None
+        other = WholeSearch(self.own, self.plain, self.found, self.laws, self.enough)
+        first = self.continued(self.beyond)
+        say(f"  whole recordings: {first.law.key} first, which ends at a bound if it is alone")
+        other.take(first, first.fit, [first, *self.first], say)
+        other.first = self.first
+        other.add_all(say)
+        other.fit = converged(other.own, other.fit.hypothesis, other.fit.x)
+        if other.left() > LEFT_OF_EACH * self.left():
+            return None
+        for law in tuple(other.taken):
+            if at_bound(other.own.problem, other.fit, law) and not other.plainer_form(law, say):
+                say(f"  whole recordings: {law.key} stays at a bound")
+                return None
+        return other
 
     def prune(self, say) -> None:
         """Remove laws without which the misfit is small enough, or increases by a negligible share.

@@ -64,6 +64,7 @@ class TakenLaws:
         self.ratios: dict[str, float] = {}
         self.tried_forms: set[str] = set()
         self.first: list[Trial] = []
+        self.beyond: Trial | None = None
 
     def doubt(self) -> float:
         """Units by which a law may lose against a rival by what nothing explains."""
@@ -172,6 +173,19 @@ class TakenLaws:
             for _, hypothesis, x in sorted(begun, key=lambda b: b[0])[:WHOLE_FORMS]
         ]
         return [(law, t) for t in trials if t is not None]
+
+    def plainer_form(self, law: Law, say) -> bool:
+        """Take the best plainer form of a law that ends at a bound; whether one ends at none."""
+        own, h = self.own, self.fit.hypothesis
+        known = own.problem.values(h, self.fit.x)[1][h.laws.index(law)]
+        base = without(own, self.fit, law)
+        others = (other_values(own, self.fit, law),)
+        begun = [begun_with(own, base, w, known, others) for w in self.laws if holds(law, w)]
+        ends = [self.in_place_of(law, converged(own, *start[1:])) for start in begun]
+        best = max(filter(None, ends), key=lambda t: t.gain, default=None)
+        if best is not None:
+            self.replaced(law, best, say)
+        return best is not None
 
     def replaced(self, law: Law, trial: Trial, say) -> None:
         """A law replaced by the one of a trial."""
