@@ -1,6 +1,7 @@
 """Typical magnitudes of a case, by which starts and steps of variants are scaled."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.effects.load_base import HELD
 from rsea_core.effects.sensor_base import FITTED
@@ -8,6 +9,8 @@ from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case, noise_floor
 
+VOLTAGES = ("duty", "voltage_V")
+DRIVEN = 99.0  # percentile: single rows in which a count changes are no speed
 DEFLECTED_SHARE = 0.1  # of the largest deflection: more is no encoder's doing
 
 
@@ -58,7 +61,8 @@ def own_magnitudes(case: Case) -> TypicalMagnitudes:
         columns=tuple({c for r in case.identification for c in r.responses}),
         loads=tuple({r.load.kind for r in case.identification}),
         rig=rig, commands=frozenset(r.command_name for r in case.identification),
-        peak_current_A=_peak_current_A(case), often_read_A=_largest(case, "current_A", 98.0),
+        peak_current_A=_peak_current_A(case) or _driven_current_A(case),
+        often_read_A=_largest(case, "current_A", 98.0),
         command=_command(case), relative=True,
         begins_deflected=_begins_deflected(case, deflection or load / K),
         spans={column: _span(case, column) for column in FITTED},
@@ -89,19 +93,24 @@ def _drive_torque(case: Case, r) -> float:
     kt = rig.torque_constant_Nm_per_A or 1.0
     if "current_A" in r:
         return float(np.std(r["current_A"])) * kt * N
-    if r.command_name in ("duty", "voltage_V"):
-        volts = (rig.supply_voltage_V or 1.0) if r.command_name == "duty" else 1.0
-        left = volts * r[r.command_name]
-        if "motor_angle_rad" in r and rig.back_emf_constant_Vs_per_rad:
-            speed = np.gradient(r["motor_angle_rad"], r.time_s)
-            left = left - rig.back_emf_constant_Vs_per_rad * speed
-        volts = min(float(np.std(left)), volts * float(np.std(r[r.command_name])))
+    if r.command_name in VOLTAGES:
+        given, left = _winding_voltage(rig, r)
+        volts = min(float(np.std(left)), float(np.std(given)))
         return volts / (rig.terminal_resistance_ohm or 1.0) * kt * N
     if r.command_name == "current_command_A":
         return float(np.std(r[r.command_name])) * kt * N
     if r.command_name == POSITION_COMMAND:
         return _servo_torque(rig, r, N)
     return float(np.std(r[r.command_name])) * N if r.command_name else 0.0
+
+
+def _winding_voltage(rig, r) -> tuple[NDArray, NDArray]:
+    """Voltage (n,) at the winding, and what back-EMF leaves of it if the motor's angle is read."""
+    given = r[r.command_name] * ((rig.supply_voltage_V or 1.0) if r.command_name == "duty" else 1.0)
+    if "motor_angle_rad" not in r or not rig.back_emf_constant_Vs_per_rad:
+        return given, given
+    speed = np.gradient(r["motor_angle_rad"], r.time_s)
+    return given, given - rig.back_emf_constant_Vs_per_rad * speed
 
 
 def _servo_torque(rig, r, ratio: float) -> float:
@@ -172,6 +181,14 @@ def _peak_current_A(case: Case) -> float | None:
     """The largest current that was read, or else commanded; None where there is none."""
     read = _largest(case, "current_A", 99.9)
     return _largest(case, "current_command_A", 99.9) if read is None else read
+
+
+def _driven_current_A(case: Case) -> float | None:
+    """The largest current that a voltage drives through the winding's resistance, without limit."""
+    rig = case.rig
+    driven = [r for r in case.identification if r.command_name in VOLTAGES]
+    volts = [np.percentile(np.abs(_winding_voltage(rig, r)[1]), DRIVEN) for r in driven]
+    return float(max(volts)) / (rig.terminal_resistance_ohm or 1.0) if volts else None
 
 
 def _largest(case: Case, column: str, percentile: float) -> float | None:

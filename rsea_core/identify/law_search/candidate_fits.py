@@ -273,8 +273,8 @@ def _equal_shares(share: NDArray, least: int) -> NDArray:
 def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
     """Whether a value of a law ran into a bound that is not its absence.
 
-    A winding far above `MOST_RISE_K` counts as such: its resistance grows with its temperature without
-    limit (thermal runaway), and the law can then follow any mismatch.
+    A winding far above `MOST_RISE_K` counts as such: its resistance grows with its temperature
+    without limit (thermal runaway), and the law can then follow any mismatch.
     """
     if values_at_bound(problem, fit, law):
         return True

@@ -82,7 +82,8 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
             return with_whole_runs(other, say, again=again)
-    search = search.begun_beyond(say) or search
+    if not found.sound:
+        search = search.begun_beyond(say) or search
     if search.left() <= search.enough:
         search.refine(say)
         search.seek_rivals(say)
@@ -170,7 +171,7 @@ def _with_other_timing(
 
 
 def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
-    """Laws that explain most of what parameters leave, of rows unseen too: together, or one alone."""
+    """Laws, or one alone, that explain most of what parameters leave, of rows unseen too."""
     own, plain = search.own, search.plain
     excess_before = excess(own, plain.hypothesis, plain.x)
     if excess_before == 0.0:  # one reading is not predicted, and others better than their noise
@@ -262,7 +263,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         best = nearly.best
         # a torque that acts once is flexible: it must leave clearly less than a lasting law
         share = 1.0 / LEFT_OF_EACH if found.acts_once else LEFT_OF_EACH
-        if misfit(own, best.hypothesis, best.x) < share * left:
+        if misfit(nearly.estimator, best.hypothesis, best.x) < share * left:
             return nearly
     if not found.steps:
         return _with_shape(found, own, say)

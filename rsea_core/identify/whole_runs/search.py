@@ -26,6 +26,7 @@ from rsea_core.identify.multistep.criteria import (
     LEFT_OF_EACH,
     MANY_STARTS,
     NEARLY_EXPLAINED,
+    NEEDS_NO_WINDOWS,
     NEGLIGIBLE_INCREASE,
     PER_VALUE,
     PULSES,
@@ -65,18 +66,18 @@ class WholeSearch(TakenLaws):
         """Take a law that gains little, if it explains most of what is left; whether one does.
 
         Beside a large effect a small one gains a small share of the cost. A wrong law explains only
-        part of the errors that an inexact form of another law leaves. A torque that acts once is
-        left out: it can fit any such error.
+        part of the errors that an inexact form of another law leaves. A torque that acts once can
+        fit most of such an error where the motion is large: it must explain `NEEDS_NO_WINDOWS`.
         """
         before = self.excess()
-        lasting = (t for t in trials if t.law.effect != LoadDisturbance.effect)
-        best = next(lasting, None)
+        best = next(iter(trials), None)
         if best is None or not self.taken or best.gain < NEARLY_EXPLAINED * before:
             return False
         fit = self.to_minimum(best)
         share = 1.0 - excess(self.own, fit.hypothesis, fit.x) / before
         say(f"  whole recordings: {best.law.key} explains {share:.2f} of what others leave")
-        if share < EXPLAINED:
+        once = best.law.effect == LoadDisturbance.effect
+        if share < (NEEDS_NO_WINDOWS if once else EXPLAINED):
             return False
         self.take(best, fit, trials, say)
         return True

@@ -2,6 +2,7 @@
 
 import pytest
 
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.spring_parallel import SpringParallel
 from rsea_core.identify.law_search.search import laws_of
@@ -39,6 +40,16 @@ def test_a_small_law_that_explains_what_a_large_one_leaves_is_taken(with_frictio
     assert search.add_last(lambda text: None)
     assert [law.key for law in search.taken] == [SPRING, FRICTION]
     assert search.excess() < 0.15 * left
+
+
+def test_a_small_torque_that_acts_once_is_taken_if_it_explains_what_a_large_law_leaves(tmp_path):
+    pulse = LoadDisturbance(start_s=5.0, end_s=6.0, peak_Nm=0.003)
+    search = sprung(tmp_path, STIFF, pulse)
+    left = search.excess()
+    assert LEAST_EXCESS < left < LEAST_OF_LEFT * search.plain_excess()
+    assert search.add_last(lambda text: None)
+    assert [law.effect for law in search.taken] == ["spring-parallel", "load-disturbance"]
+    assert search.excess() < 0.05 * left
 
 
 def test_no_law_is_taken_where_one_leaves_noise_alone(tmp_path):
