@@ -85,21 +85,9 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     if not found.sound:
         search = search.begun_beyond(say) or search
     if search.left() <= search.enough:
-        search.refine(say)
-        search.seek_rivals(say)
-        search.compare(say)
-        search.predict(say)
-        say(f"whole recordings: laws taken leave {search.excess():.0f} units more than noise")
-        if not found.sound and search.excess() >= LEAST_EXCESS:
-            other = _with_other_timing(search, say, least=NEARLY_EXPLAINED) if again else None
-            if other is not None and other[0].complete:
-                return other
-            if search.add_last(say):
-                search.compare(say, last=True)
-                search.predict(say)
-        of_log = found.sound and _within_half_a_row(search)
-        if not of_log and search.complete(say):
-            return _complete(found, search), None
+        finished = _finished(found, search, say, again=again)
+        if finished is not None:
+            return finished
     if found.sound:  # an error that small is not evidence of a law that explains a part of it
         return found, None
     nearly = _nearly_complete(found, search, say)
@@ -107,6 +95,30 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
         return other
     return found, nearly
+
+
+def _finished(
+    found: Found, search: WholeSearch, say, *, again: bool
+) -> tuple[Found, Found | None] | None:
+    """Laws that leave little, in their best forms and compared with rivals, if they are complete.
+
+    None where they do not predict rows unseen.
+    """
+    search.refine(say)
+    search.seek_rivals(say)
+    search.compare(say)
+    search.predict(say)
+    say(f"whole recordings: laws taken leave {search.excess():.0f} units more than noise")
+    if not found.sound and search.excess() >= LEAST_EXCESS:
+        other = _with_other_timing(search, say, least=NEARLY_EXPLAINED) if again else None
+        if other is not None and other[0].complete:
+            return other
+        if search.add_last(say):
+            search.compare(say, last=True)
+            search.predict(say)
+    of_log = found.sound and _within_half_a_row(search)
+    complete = not of_log and search.complete(say)
+    return (_complete(found, search), None) if complete else None
 
 
 def _parameters_alone(own: Estimator, fit: Estimate) -> tuple[Estimate, float]:

@@ -55,8 +55,24 @@ def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, s
     like = replace(found, estimator=own, horizon=None)
     rested = with_pause_shown(like, (fit.hypothesis, fit.x), None)
     trials = rested, (plain.hypothesis, plain.x)
-    costs = [_cost(_held_out(found, own, trial), *trial) for trial in trials]
+    costs = [_cost(recordings_held_out(found, own, trial), *trial) for trial in trials]
     return share if costs[0] < (NEGLIGIBLE_INCREASE if once else 1.0) * costs[1] else np.inf
+
+
+def recordings_held_out(
+    found: Found, own: Estimator, trial: tuple[Hypothesis, NDArray]
+) -> Estimator:
+    """Recordings held out in the sensors' noise, begun as those fitted are.
+
+    The start is smoothed in the noise of windows, unknown torques included: in the sensors' noise
+    alone what the smoother's model lacks, as a flexible link, moves the start.
+    """
+    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    like = replace(found, estimator=found.base_estimator, horizon=None)
+    begun = in_sensor_noise(of_recordings(like, unseen, trial, None))
+    noises = {t.experiment.channels: t.noise for t in own.tracks}
+    same = [noises.get(t.experiment.channels, t.noise) for t in begun.tracks]
+    return own.having([prepared(t, noise=n) for t, n in zip(begun.tracks, same, strict=True)])
 
 
 def needed(own: Estimator, fit: Estimate, law: Law, less: Estimate) -> tuple[bool, float]:
@@ -108,20 +124,6 @@ def _left_unseen(own: Estimator, fit: Estimate) -> float:
         for every, seen in rows
         for later in [(seen[0] == 0.0) & (every[0] != 0.0)]
     )
-
-
-def _held_out(found: Found, own: Estimator, trial: tuple[Hypothesis, NDArray]) -> Estimator:
-    """Recordings held out in the sensors' noise, begun as those fitted are.
-
-    The start is smoothed in the noise of windows, unknown torques included: in the sensors' noise
-    alone what the smoother's model lacks, as a flexible link, moves the start.
-    """
-    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
-    like = replace(found, estimator=found.base_estimator, horizon=None)
-    begun = in_sensor_noise(of_recordings(like, unseen, trial, None))
-    noises = {t.experiment.channels: t.noise for t in own.tracks}
-    same = [noises.get(t.experiment.channels, t.noise) for t in begun.tracks]
-    return own.having([prepared(t, noise=n) for t, n in zip(begun.tracks, same, strict=True)])
 
 
 def _cost(own: Estimator, h: Hypothesis, x: NDArray) -> float:

@@ -11,7 +11,10 @@ from rsea_core.effects.layout import N_EFFECTS
 from rsea_core.effects.variant import PLANT, RunConditions, TrialMachine
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
+from rsea_core.machine.inputs import Load
+from rsea_core.machine.rig import Rig
 from rsea_core.model.diagnosed_effects import read_laws
+from rsea_core.recordings.recording import Recording
 from tests.cases.one_axis import Units, axis_case, axis_recording, axis_rig
 
 SMALL_AND_FAST = Units(torque=1e-6, time=1e-3)
@@ -46,6 +49,21 @@ def test_typical_speed_does_not_come_from_the_steps_of_a_coarse_encoder(tmp_path
     fine = own_magnitudes(axis_case(tmp_path, r, rig=axis_rig()))
     assert fine.speed_rad_per_s == pytest.approx(fine.angle_rad / fine.time_s)
     assert 0.2 < fine.time_s < 0.6  # of three sines of 0.31, 0.83 and 1.9 Hz
+
+
+def test_the_peak_current_of_a_voltage_is_what_back_emf_leaves_of_it(tmp_path):
+    rig = Rig(name="motor", parts=("drive", "load"), terminal_resistance_ohm=2.0,
+              torque_constant_Nm_per_A=0.5, back_emf_constant_Vs_per_rad=0.5, current_limit_A=50.0,
+              load_inertia_kgm2=0.02)  # fmt: skip
+    time = 1e-2 * np.arange(500)
+    columns = {"time_s": time, "voltage_V": np.full(500, 3.0), "motor_angle_rad": 2.0 * time}
+    r = Recording(file="steady.csv", load=Load(kind="free"), columns=columns, sample_time_s=1e-2)
+    typical = own_magnitudes(axis_case(tmp_path, r, rig=rig))
+    assert typical.peak_current_A == pytest.approx((3.0 - 0.5 * 2.0) / 2.0)
+    assert typical.often_read_A is None
+    limit = next(w for w in DriveSaturation.candidates(typical) if w.law == "limit")
+    assert max(limit.starts)[0] == pytest.approx(1.0)
+    assert limit.unknowns[0].high == 50.0  # the limit of the rig file
 
 
 def test_limits_and_starts_of_laws_scale_with_the_machine(cases):

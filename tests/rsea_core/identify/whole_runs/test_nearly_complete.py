@@ -28,7 +28,7 @@ def searched(folder, *terms) -> tuple[Found, Found | None]:
     return with_whole_runs(begun(case, None, lambda _: None), lambda _: None)
 
 
-def test_two_laws_that_explain_nearly_all_stand_beside_an_error_of_the_log(tmp_path):
+def test_two_laws_that_explain_nearly_all_stand_despite_an_error_of_the_log(tmp_path):
     found, nearly = searched(tmp_path, SPRING, LoadFriction(coulomb_Nm=0.01))
     assert not found.complete
     assert {step.law.effect for step in nearly.steps} == {"spring-parallel", "load-friction"}

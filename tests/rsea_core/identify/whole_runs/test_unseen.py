@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.load_flexibility import LoadFlexibility
 from rsea_core.effects.spring_parallel import SpringParallel
 from rsea_core.identify.law_search.candidate_fits import fitted
+from rsea_core.identify.law_search.hold_out import part_of
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Projection, screen
 from rsea_core.identify.law_search.search import laws_of
-from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
+from rsea_core.identify.whole_runs.unseen import needed, recordings_held_out, unseen_share, without
 from tests.cases.one_axis import axis_recording
 from tests.cases.whole_runs import searched_axis
 
@@ -67,6 +69,19 @@ def test_a_recording_held_out_refutes_a_pulse_whose_values_predict_it_worse(
     off = np.eye(fit.x.size)[[p.key for p in own.problem.nominals].index("load_inertia_kgm2")]
     fit = replace(fit, x=fit.x + tolerances * off)
     assert np.isinf(unseen_share(found, own, fit, plain, lambda text: None)) == refuted
+
+
+def test_a_recording_held_out_that_equals_a_fitted_one_has_its_innovations(tmp_path):
+    stiffness = (2.0 * np.pi * 4.0) ** 2 * 0.02 * 0.3 * 0.7  # a free link of 4 Hz
+    link = LoadFlexibility(link_stiffness_Nm_per_rad=stiffness, outer_fraction=0.3)
+    fitted_one = part_of(axis_recording(link, seed=1), 300, 1200)
+    copy = replace(fitted_one, file="copy.csv", role="validation")
+    found, own, plain = searched_axis(tmp_path, fitted_one, copy)
+    trial = plain.hypothesis, plain.x
+    other = recordings_held_out(found, own, trial)
+    seen, unseen = (np.std(e.innovations([trial])[0]) for e in (own, other))
+    assert seen > 3.0  # the link is missing
+    assert unseen == pytest.approx(seen, rel=0.05)
 
 
 def test_a_fit_without_a_law_is_that_of_the_others(sprung, true_law):
