@@ -15,15 +15,14 @@ from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANC
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.law_search.hold_out import HeldOut, free_run, held_out
-from rsea_core.identify.law_search.longer_windows import error_left_beyond
+from rsea_core.identify.law_search.hold_out import beyond_chance, free_run
+from rsea_core.identify.law_search.longer_windows import holds_no_further
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     DEPENDENT,
     DOUBTED_ERROR,
     LEAST_RATIO,
     NO_PREDICTION,
-    NOT_BEYOND,
     PER_VALUE,
     RIVAL_SCALE,
     RIVAL_SHARE,
@@ -61,7 +60,7 @@ class WindowVerdict(Conclusion):
     """Everything that is said of one case, of a multistep search."""
 
     def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
-        found, self.held_out = _beyond_chance(found)
+        found, self.held_out = beyond_chance(found)
         instead = None if found.complete else gain_over_named(found, say)
         if instead is not None:
             found, self.held_out = found.parameters_alone(), None
@@ -87,7 +86,7 @@ class WindowVerdict(Conclusion):
         self.error = relative_error(self.estimator, h, self.fit.x)
         self.unknown_torque = unknown_torque(self.estimator, self.error)
         self.unpredicted = self.error > NO_PREDICTION and not (found.sound or found.complete)
-        self.no_further = not found.complete and (error_left_beyond(found) or 0.0) > NOT_BEYOND
+        self.no_further = holds_no_further(found, self.held_out)
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
@@ -320,16 +319,6 @@ def _reason_of(judged: WindowVerdict) -> str | None:
             f" {100 * judged.error:.1f} % of the spread, and the innovations are dependent"
         )
     return None
-
-
-def _beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
-    """What was found and what it gains on rows held out; without laws that lose there, if weak."""
-    unseen = held_out(found) if found.steps else None
-    if unseen is None or unseen.gain >= WORSE:
-        return found, unseen
-    if found.steps[0].gain > UNEVEN_GAIN and not found.sound:
-        return found, unseen
-    return found.parameters_alone(), None
 
 
 def _gains_much(step) -> bool:

@@ -17,7 +17,14 @@ from rsea_core.effects.load_base import HELD
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import even_ratio
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.multistep.criteria import SHORT, SILENT
+from rsea_core.identify.multistep.criteria import (
+    KEPT_RATIO,
+    PREDICTABLE,
+    SHORT,
+    SILENT,
+    UNEVEN_GAIN,
+    WORSE,
+)
 from rsea_core.identify.multistep.estimator import Estimator
 from rsea_core.identify.multistep.experiment import LEAST_ROWS, Experiment
 from rsea_core.identify.multistep.horizons import smooth, with_windows
@@ -97,13 +104,8 @@ def held_out(found: Found) -> HeldOut | None:
         return None
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     own, gain, ratio = found.estimator, 0.0, 0.0
-    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
-    if unseen:
-        others = [of_recordings(found, unseen, trial, found.horizon) for trial in trials]
-        before, after = (o.innovations([t]) for o, t in zip(others, trials, strict=True))
-        gain = own.tempering * (_power(before) - _power(after))
-        if np.isfinite(gain):
-            ratio = even_ratio(others[1], before, after)
+    if any(b.recording.role == "validation" for b in found.problem.benches):
+        gain, ratio = _gain_held_out(found, trials, found.horizon)
     if abs(gain) < SILENT:  # recordings that do not move what the laws are about
         shortened = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
         trials = [(h, shortened.fit(h, x, iterations=6).x) for h, x in trials]
@@ -113,6 +115,45 @@ def held_out(found: Found) -> HeldOut | None:
         ]
         gain, ratio = own.tempering * (powers[0] - powers[1]), 0.0
     return HeldOut(gain=gain, ratio=ratio) if np.isfinite(gain) else None
+
+
+def beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
+    """What was found and what it gains on rows held out; without laws that lose there, if weak.
+
+    Laws that lose in windows as long as the machine seemed predictable, and gain evenly in short
+    ones, are not refuted: the recordings held out are not predictable for so long.
+    """
+    unseen = held_out(found) if found.steps else None
+    if unseen is None or unseen.gain >= WORSE:
+        return found, unseen
+    shorter = held_out_in_short_windows(found)
+    if shorter is not None and shorter.ratio > KEPT_RATIO:
+        return found, shorter
+    if found.steps[0].gain > UNEVEN_GAIN and not found.sound:
+        return found, unseen
+    return found.parameters_alone(), None
+
+
+def held_out_in_short_windows(found: Found) -> HeldOut | None:
+    """Gain of the laws on recordings held out in windows of one time scale.
+
+    A machine that stops at detents, or turns over, is not predictable for longer whatever its laws:
+    the smallest error of the start decides where it comes to rest. None without such recordings.
+    """
+    if not any(b.recording.role == "validation" for b in found.problem.benches):
+        return None
+    trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
+    gain, ratio = _gain_held_out(found, trials, PREDICTABLE)
+    return HeldOut(gain=gain, ratio=ratio) if np.isfinite(gain) else None
+
+
+def _gain_held_out(found: Found, trials: list, horizon: float | None) -> tuple[float, float]:
+    """Gain of the second trial over the first on recordings held out, and over its deviation."""
+    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    others = [of_recordings(found, unseen, trial, horizon) for trial in trials]
+    before, after = (o.innovations([t]) for o, t in zip(others, trials, strict=True))
+    gain = found.estimator.tempering * (_power(before) - _power(after))
+    return gain, even_ratio(others[1], before, after) if np.isfinite(gain) else 0.0
 
 
 def with_pause_shown(

@@ -15,7 +15,15 @@ from rsea_core.identify.law_search.candidate_fits import (
     settled,
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step
-from rsea_core.identify.multistep.criteria import HORIZONS, LOST, PER_VALUE, RIVAL_SCALE
+from rsea_core.identify.law_search.hold_out import HeldOut
+from rsea_core.identify.multistep.criteria import (
+    HORIZONS,
+    KEPT_RATIO,
+    LOST,
+    NOT_BEYOND,
+    PER_VALUE,
+    RIVAL_SCALE,
+)
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import (
     likelier,
@@ -118,6 +126,17 @@ def error_left_beyond(found: Found) -> float | None:
         errors.append(relative_error(trial, h, trial.fit(h, fit.x, iterations=5).x))
     plain, left = errors
     return left / plain if plain < 1.0 else None
+
+
+def holds_no_further(found: Found, unseen: HeldOut | None) -> bool:
+    """Whether laws predict no better than parameters alone in longer windows than their own.
+
+    Recordings held out on which they gain evenly say more: longer windows may hold more than can
+    be predicted.
+    """
+    if found.complete or (unseen is not None and unseen.ratio > KEPT_RATIO):
+        return False
+    return (error_left_beyond(found) or 0.0) > NOT_BEYOND
 
 
 def _rank_again(found: Found, say) -> None:

@@ -9,6 +9,7 @@ DOUBTED_SHARE = 0.4  # of independent innovations, below which no law fits the m
 DEPENDENT = 0.3  # the same, below which values alone do not explain the recordings
 LEAST_ROWS = 10  # of a window
 QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
+PREDICTABLE = 1.0  # time scales of the motion: windows in which chaotic motions are predictable
 SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
 TIMING_SHARE = 0.1  # of the least law's gain, that another timing must gain for a new search

@@ -159,6 +159,9 @@ class WholeSearch(TakenLaws):
         say(f"  whole recordings: {first.law.key} first, which ends at a bound if it is alone")
         other.take(first, first.fit, [first, *self.first], say)
         other.first = self.first
+        if not other.add(say) or other.left() > self.left():
+            return None
+        other.prune(say)
         other.add_all(say)
         other.fit = converged(other.own, other.fit.hypothesis, other.fit.x)
         if other.left() > LEFT_OF_EACH * self.left():

@@ -6,13 +6,17 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.drive_thermal import DriveThermal
+from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.hold_out import (
+    beyond_chance,
+    held_out,
     part_of,
     with_pause_shown,
     with_shared_recordings,
 )
-from rsea_core.identify.law_search.search import laws_of
+from rsea_core.identify.law_search.search import add_all, begun, laws_of
+from rsea_core.identify.multistep.criteria import KEPT_RATIO, WORSE
 from rsea_core.machine.inputs import Load
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 from tests.cases.whole_runs import searched_axis
@@ -84,3 +88,23 @@ def test_a_recording_held_out_shows_how_long_the_motor_rested_before_it(tmp_path
     _, shown = with_pause_shown(found, (h, x), None)
     pause_s = own.problem.values(h, shown)[1][-1]["pause_s"]
     assert pause_s >= 300.0 if fitted == 1 else pause_s == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("factor", "kept"), [(1.05, True), (-1.0, False)])
+def test_a_law_whose_axis_stops_at_other_detents_is_refuted_only_if_short_windows_do(
+    tmp_path, factor, kept
+):
+    cogging = MotorCogging(amplitude_Nm=0.8, cycles_per_rev=7, phase_rad=0.8)
+    fitted = (axis_recording(cogging, seed=seed) for seed in (3, 4))
+    held = axis_recording(cogging, seed=5, role="validation")
+    found = begun(axis_case(tmp_path, *fitted, held, rig=axis_rig()), None, lambda text: None)
+    laws = [law for law in laws_of(found) if law.key == "motor-cogging/7 per turn"]
+    add_all(found, laws, lambda text: None)
+    x = found.best.x.copy()
+    x[-2:] *= factor  # both waves
+    found.best = replace(found.best, x=x)
+    assert held_out(found).gain < WORSE
+    end, unseen = beyond_chance(found)
+    assert end.steps
+    assert (unseen.gain > 0.0) == kept
+    assert (unseen.ratio > KEPT_RATIO) == kept

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.law_search import longer_windows
-from rsea_core.identify.law_search.longer_windows import error_left_beyond
+from rsea_core.identify.law_search.hold_out import HeldOut
+from rsea_core.identify.law_search.longer_windows import error_left_beyond, holds_no_further
 
 
 def found_with(monkeypatch, horizon, plain: float, left: float, *, longer: bool = False):
@@ -23,7 +24,7 @@ def found_with(monkeypatch, horizon, plain: float, left: float, *, longer: bool 
     monkeypatch.setattr(longer_windows, "relative_error", lambda own, h, x: own.error)
     found = SimpleNamespace(
         horizon=horizon, predicts_longer=longer, steps=[None], base=fit, best=fit,
-        base_estimator=estimator(plain), estimator=estimator(left),
+        base_estimator=estimator(plain), estimator=estimator(left), complete=False,
     )  # fmt: skip
     return found, asked
 
@@ -50,3 +51,13 @@ def test_laws_that_made_the_windows_longer_have_held_beyond_theirs(monkeypatch):
     found, asked = found_with(monkeypatch, 4.0, 0.5, 0.5, longer=True)
     assert error_left_beyond(found) is None
     assert asked == []
+
+
+@pytest.mark.parametrize(
+    ("left", "ratio", "no_further"), [(0.48, 0.0, True), (0.48, 5.0, False), (0.3, 0.0, False)]
+)
+def test_laws_that_predict_recordings_held_out_evenly_need_not_hold_in_longer_windows(
+    monkeypatch, left, ratio, no_further
+):
+    found, _ = found_with(monkeypatch, 1.0, 0.5, left)
+    assert holds_no_further(found, HeldOut(gain=30.0, ratio=ratio)) == no_further
