@@ -1,7 +1,7 @@
 """A fit of the multistep search as reports read it, and the covariances of its values."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,14 @@ from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     RIVAL_SCALE,
     RIVAL_SHARE,
+    TIMING_DOUBT,
     UNBELIEVED,
     UNKNOWN_SHARE,
     WITHIN_ROW,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.machine.inputs import POSITION_COMMAND
 
@@ -100,6 +102,9 @@ def strained_value(problem: MultistepProblem, fit: FoundFit) -> Nominal | None:
 def late_command(judged) -> dict | None:
     """A delay of the command beyond what a log's own convention can be; not of a servo.
 
+    A command that moves linearly acts half a row earlier than one that is held: where readings do
+    not tell which, the delay is known to half a row.
+
     judged : `WindowVerdict`
     """
     if any(r.command_name == POSITION_COMMAND for r in judged.case.identification):
@@ -114,6 +119,8 @@ def late_command(judged) -> dict | None:
         latest = law.unknowns[0].high - 1e-3 * row
         of_log = (1.0 + 0.5 * judged.problem.timing.linear) * row  # linear: half a row of hold
         if DELAY_ROWS * row < delay < latest and delay - of_log > 5.0 * std:
+            if _as_likely_otherwise(judged):
+                std = np.hypot(std, 0.5 * row)
             return {
                 "name": law.effect, "subsystem": "drive", "confidence": 0.95,
                 "law": law.law, "class": [law.effect], "alternatives": [],
@@ -121,6 +128,15 @@ def late_command(judged) -> dict | None:
                                            "at_bound": False}},
             }  # fmt: skip
     return None
+
+
+def _as_likely_otherwise(judged) -> bool:
+    """Whether commands that move the other way between rows are as likely, with another delay."""
+    own, fit = judged.estimator, judged.fit
+    timing = replace(judged.problem.timing, linear=not judged.problem.timing.linear)
+    problem = MultistepProblem(judged.problem.case, timing=timing, steps=own.problem.steps)
+    other = with_best_delay(with_problem(own, problem), fit.hypothesis, fit.x)
+    return other.cost < own.fit(fit.hypothesis, fit.x, iterations=5).cost + TIMING_DOUBT
 
 
 def unknown_torque(estimator: Estimator, error: float) -> str | None:

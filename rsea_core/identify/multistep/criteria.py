@@ -12,6 +12,7 @@ QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of p
 PREDICTABLE = 1.0  # time scales of the motion: windows in which chaotic motions are predictable
 SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
+TIMING_DOUBT = 10.0  # units: a difference that does not tell a linear command from a held one
 TIMING_SHARE = 0.1  # of the least law's gain, that another timing must gain for a new search
 LEAST_GAIN = 8.0  # of a law
 EVEN = 0.1  # of the mean: least scatter of the stretches in that ratio
