@@ -152,8 +152,7 @@ class DriveDeadZone(Term):
     @classmethod
     def sentence(cls, f: FigureText) -> str:
         """The width."""
-        width = f.figures["width_duty"]
-        return f"a dead zone of the drive, {width:.3g} in the unit of the command"
+        return f"a dead zone of the drive, {f.of_command('width_duty')}"
 
 
 @dataclass(frozen=True, kw_only=True)

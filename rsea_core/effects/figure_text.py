@@ -60,11 +60,14 @@ class FigureText:
         The column of a sensor's effect, else empty.
     linear : bool
         As in `amount`.
+    command_unit : str
+        Of a figure that is a command; empty: it is a share of the drive's largest command.
     """
 
     figures: Mapping[str, Figure]
     column: str
     linear: bool
+    command_unit: str = ""
 
     def __call__(self, name: str, unit: str) -> str:
         return self.of(self.figures[name], unit)
@@ -72,6 +75,10 @@ class FigureText:
     def of(self, value: float, unit: str) -> str:
         """A value with its unit."""
         return amount(value, unit, linear=self.linear)
+
+    def of_command(self, name: str) -> str:
+        """A command with its unit, or as a share of the largest one."""
+        return f"{self.figures[name]:.3g} {self.command_unit or 'of the largest command'}"
 
     def percent(self, value: float) -> str:
         """A share in percent."""

@@ -135,8 +135,16 @@ class Rig:
 
     def full_command(self, name: str | None) -> float:
         """Largest command of a drive in the command's own unit; 1 where no value states it."""
+        return self._stated_command(name) or 1.0
+
+    def unit_of_command(self, name: str | None) -> str:
+        """Unit of a command over `full_command`; empty where this makes it a share."""
+        whole = name in (None, "duty") or self._stated_command(name)
+        return "" if whole else name.rpartition("_")[2]
+
+    def _stated_command(self, name: str | None) -> float | None:
         full = {"voltage_V": self.supply_voltage_V, "current_command_A": self.current_limit_A}
-        return full.get(name) or 1.0
+        return full.get(name)
 
     def findings(self) -> tuple[str, ...]:
         """What is legal but worth knowing before believing the numbers, a sentence each."""

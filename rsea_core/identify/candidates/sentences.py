@@ -16,6 +16,7 @@ def effect_text(
     *,
     law: str = "",
     linear: bool = False,
+    command_unit: str = "",
 ) -> str | None:
     """What an effect is and how large; None where the figures do not say it.
 
@@ -29,9 +30,11 @@ def effect_text(
         Its law, which may have a sentence of its own.
     linear : bool
         As in `figure_text.amount`.
+    command_unit : str
+        As in `FigureText`.
     """
     laws = LAWS.get(effect, {})
-    text = FigureText(figures, subsystem.partition(":")[2], linear)
+    text = FigureText(figures, subsystem.partition(":")[2], linear, command_unit)
     for kind in (laws.get(law), *laws.values()):
         if kind is not None:
             try:

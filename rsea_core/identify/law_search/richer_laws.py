@@ -6,8 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_friction_angle import LoadFrictionAngle
+from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import at_bound, count_values
@@ -22,6 +24,8 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import with_noise
+
+TRANSMISSION, OFFSET = GearTransmissionError.effect, SensorOffset.effect
 
 
 def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
@@ -109,6 +113,8 @@ def prefer_plainer(finished: list, worth) -> list:
         for other in finished:
             fewer = count_values(other[0].law) < count_values(entry[0].law)
             same = other[0].law.subsystem == entry[0].law.subsystem
+            # a transmission error counts from a zero of its own, as an encoder with an offset does
+            same |= (entry[0].law.effect, other[0].law.effect) == (TRANSMISSION, OFFSET)
             nested = entry[0].law.effect == LoadFrictionAngle.effect
             nested = nested and other[0].law.effect == LoadFriction.effect
             share = NESTED_SHARE if nested else PLAINER_SHARE

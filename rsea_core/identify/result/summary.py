@@ -131,8 +131,11 @@ def _named(conclusion: ReportedDiagnosis, j: int) -> str:
     """An effect and how large it is, its name in the contract beside it."""
     law = conclusion.fit.hypothesis.laws[j]
     figures = conclusion.reported_figures(conclusion.fit.x, j)
-    linear = conclusion.problem.case.rig.axis == "linear"
-    own_text = effect_text(law.effect, law.subsystem, figures, law=law.law, linear=linear)
+    case = conclusion.problem.case
+    own_text = effect_text(
+        law.effect, law.subsystem, figures, law=law.law, linear=case.rig.axis == "linear",
+        command_unit=case.rig.unit_of_command(case.recordings[0].command_name),
+    )  # fmt: skip
     if own_text is not None:
         return f"{own_text} ({law.effect})"
     values = (f"{n} {v:.4g}" if not isinstance(v, str) else f"{n} {v}" for n, v in figures.items())

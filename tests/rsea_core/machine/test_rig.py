@@ -1,6 +1,7 @@
 """Rig files are read as the contract says, and what is unusable gets one line."""
 
 import pickle
+from dataclasses import replace
 
 import pytest
 
@@ -49,6 +50,13 @@ def test_full_command_is_in_the_commands_own_unit():
     found = [rig.full_command(name) for name in ("duty", "voltage_V", "current_command_A", None)]
     assert found == [1.0, 24.0, 6.0, 1.0]
     assert Rig(name="none", parts=("drive",)).full_command("current_command_A") == 1.0
+
+
+def test_a_command_has_its_unit_where_no_value_makes_it_a_share():
+    bare = Rig(name="none", parts=("drive",))
+    names = ("duty", "voltage_V", "current_command_A", "motor_torque_Nm", None)
+    assert [bare.unit_of_command(name) for name in names] == ["", "V", "A", "Nm", ""]
+    assert replace(bare, current_limit_A=2.0).unit_of_command("current_command_A") == ""
 
 
 def test_rig_can_be_hashed_and_sent_to_another_process():

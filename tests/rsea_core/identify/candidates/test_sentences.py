@@ -88,6 +88,14 @@ def test_effects_are_described_as_a_person_would(effect, subsystem, figures, exp
     assert effect_text(effect, subsystem, figures) == expected
 
 
+@pytest.mark.parametrize(
+    ("unit", "expected"), [("", "0.0139 of the largest command"), ("V", "0.0139 V")]
+)
+def test_a_dead_zone_has_the_unit_of_the_command_where_no_largest_one_is_stated(unit, expected):
+    text = effect_text("drive-dead-zone", "drive", {"width_duty": 0.01386}, command_unit=unit)
+    assert text == f"a dead zone of the drive, {expected}"
+
+
 def test_what_the_figures_do_not_hold_is_not_stated():
     assert effect_text("gear-backlash", "gear", {}) is None
     assert effect_text("x-lost-counts", "sensor:motor_angle_rad", {}) is None

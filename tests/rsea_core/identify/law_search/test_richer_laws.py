@@ -2,6 +2,8 @@
 
 from types import SimpleNamespace
 
+import pytest
+
 from rsea_core.effects.load_drag import LoadDrag
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
@@ -46,3 +48,17 @@ def test_the_richer_law_of_a_rival_near_the_best_one_takes_its_place(monkeypatch
     assert [e[0].law.key for e in found] == ["near", "best", "far"]
     assert tried == ["best", "near"]
     assert known == {"best", "near"}
+
+
+@pytest.mark.parametrize(("gain", "named"), [(98.0, "sensor-offset"), (50.0, "transmission")])
+def test_an_offset_that_explains_as_much_is_named_before_a_transmission_error(gain, named):
+    def entry(effect, subsystem, values):
+        unknowns = [SimpleNamespace(scale=1.0)] * values
+        law = SimpleNamespace(effect=effect, subsystem=subsystem, unknowns=unknowns)
+        return (SimpleNamespace(law=law),)
+
+    error = entry("gear-transmission-error", "gear", 3)
+    offset = entry("sensor-offset", "sensor:torque_Nm", 1)
+    worth = {id(error): 100.0, id(offset): gain}
+    found = richer_laws.prefer_plainer([error, offset], lambda e: worth[id(e)])
+    assert found == ([offset] if named == "sensor-offset" else [error, offset])

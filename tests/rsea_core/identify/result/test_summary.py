@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from rsea_core import Rig
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.result.summary import summary_of
 
@@ -20,7 +21,10 @@ def conclusion(*confidences):
     return SimpleNamespace(
         verdict="missing-physics", question=None, residual=None, unbalance=None, nearest=(),
         restored_constants=(), fit=SimpleNamespace(hypothesis=Hypothesis(laws=laws), x=None),
-        problem=SimpleNamespace(case=SimpleNamespace(rig=SimpleNamespace(axis="rotary"))),
+        problem=SimpleNamespace(case=SimpleNamespace(
+            rig=Rig(name="motor", parts=("drive",)),
+            recordings=[SimpleNamespace(command_name="duty")],
+        )),
         effects=lambda: effects, explained_excess=lambda: 0.9,
         reported_figures=lambda x, j: {"size": float(j + 1)},
     )  # fmt: skip
