@@ -195,6 +195,7 @@ class DriveSaturation(Term):
             low = 0.1 * peak if typical.relative else 0.02 * top
             if typical.often_read_A is not None:  # no winding carries more than its limit
                 low = min(max(low, 0.9 * typical.often_read_A), 0.99 * top)
+            # the least is just above the bound
             shares = (0.97, 1.0, 0.8, 0.6, *((0.4, 0.25, 0.15, 0.11) if typical.relative else ()))
             found.append(
                 Law(law="limit", write=_write_limit,

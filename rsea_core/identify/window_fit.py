@@ -119,7 +119,7 @@ def late_command(judged) -> dict | None:
         latest = law.unknowns[0].high - 1e-3 * row
         of_log = (1.0 + 0.5 * judged.problem.timing.linear) * row  # linear: half a row of hold
         if DELAY_ROWS * row < delay < latest and delay - of_log > 5.0 * std:
-            if _as_likely_otherwise(judged):
+            if _other_hold_is_as_likely(judged):
                 std = np.hypot(std, 0.5 * row)
             return {
                 "name": law.effect, "subsystem": "drive", "confidence": 0.95,
@@ -130,7 +130,7 @@ def late_command(judged) -> dict | None:
     return None
 
 
-def _as_likely_otherwise(judged) -> bool:
+def _other_hold_is_as_likely(judged) -> bool:
     """Whether commands that move the other way between rows are as likely, with another delay."""
     own, fit = judged.estimator, judged.fit
     timing = replace(judged.problem.timing, linear=not judged.problem.timing.linear)

@@ -16,7 +16,7 @@ from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.hold_out import beyond_chance, free_run
-from rsea_core.identify.law_search.longer_windows import holds_no_further
+from rsea_core.identify.law_search.longer_windows import fails_in_longer_windows
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     DEPENDENT,
@@ -86,7 +86,7 @@ class WindowVerdict(Conclusion):
         self.error = relative_error(self.estimator, h, self.fit.x)
         self.unknown_torque = unknown_torque(self.estimator, self.error)
         self.unpredicted = self.error > NO_PREDICTION and not (found.sound or found.complete)
-        self.no_further = holds_no_further(found, self.held_out)
+        self.no_further = fails_in_longer_windows(found, self.held_out)
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR

@@ -128,11 +128,11 @@ def error_left_beyond(found: Found) -> float | None:
     return left / plain if plain < 1.0 else None
 
 
-def holds_no_further(found: Found, unseen: HeldOut | None) -> bool:
+def fails_in_longer_windows(found: Found, unseen: HeldOut | None) -> bool:
     """Whether laws predict no better than parameters alone in longer windows than their own.
 
-    Recordings held out on which they gain evenly say more: longer windows may hold more than can
-    be predicted.
+    Laws that gain evenly on recordings held out do not fail: the motion may not be predictable for
+    so long.
     """
     if found.complete or (unseen is not None and unseen.ratio > KEPT_RATIO):
         return False

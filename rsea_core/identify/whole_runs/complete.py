@@ -15,6 +15,7 @@ from rsea_core.identify.multistep.criteria import (
     COMPLETE,
     COMPLETE_SHARE,
     EXPLAINED,
+    EXPLAINED_TOGETHER,
     LEAST_EXCESS,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
@@ -24,7 +25,6 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_SHARE,
     SOUND,
     SOUND_IN_LEFT_NOISE,
-    TOGETHER,
     UNPREDICTED,
     WHOLE_LAWS,
 )
@@ -83,7 +83,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         if other is not found:
             return with_whole_runs(other, say, again=again)
     if not found.sound:
-        search = search.begun_beyond(say) or search
+        search = search.begun_at_bound(say) or search
     if search.left() <= search.enough:
         finished = _finished(found, search, say, again=again)
         if finished is not None:
@@ -201,7 +201,8 @@ def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
         unseen = unseen_share(found, own, trial.fit, plain, say) if predicts else np.inf
         explained = min(explained, 1.0 - unseen)
         if explained > EXPLAINED:
-            say(f"  whole recordings: {trial.law.key} explains {explained:.2f} of what is left")
+            name = trial.law.key
+            say(f"  whole recordings: {name} explains {explained:.2f} of what parameters leave")
             search.fit, search.taken = trial.fit, [trial.law]
             search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
             return replace(_complete(found, search), explained=explained)
@@ -232,7 +233,7 @@ def _nearly_complete_together(
     explained = 1.0 - max(left / excess_before, unseen)
     if explained < EXPLAINED:
         return None
-    say(f"  whole recordings: together these laws explain {explained:.3f} of what is left")
+    say(f"  whole recordings: together laws explain {explained:.3f} of what parameters leave")
     return replace(_complete(found, search), explained=explained)
 
 
@@ -240,7 +241,7 @@ def _leaves_little(search: WholeSearch, excess_before: float) -> bool:
     """Whether several lasting laws leave a small share of what parameters leave."""
     lasting = all(law.only is None for law in search.taken)
     several = len(search.taken) > 1
-    return several and lasting and search.excess() < (1.0 - TOGETHER) * excess_before
+    return several and lasting and search.excess() < (1.0 - EXPLAINED_TOGETHER) * excess_before
 
 
 def _alone(search: WholeSearch) -> list[Trial]:

@@ -125,7 +125,7 @@ class WholeSearch(TakenLaws):
     ) -> list[Trial]:
         """Candidates fitted beside a fit, best first; without those that end at a bound.
 
-        The best of these is kept (`beyond`) where it would be the first law taken.
+        The best of these is kept (`best_at_bound`) where it would be the first law taken.
         """
         found, bounded = [], []
         for c in candidates:
@@ -138,7 +138,7 @@ class WholeSearch(TakenLaws):
         found.sort(key=lambda t: -t.gain)
         if not self.taken and bounded:
             best = max(bounded, key=lambda t: t.gain)
-            self.beyond = best if not found or best.gain > found[0].gain else None
+            self.best_at_bound = best if not found or best.gain > found[0].gain else None
         return found
 
     def add_all(self, say) -> None:
@@ -148,18 +148,18 @@ class WholeSearch(TakenLaws):
                 return
             self.prune(say)
 
-    def begun_beyond(self, say) -> "WholeSearch | None":
+    def begun_at_bound(self, say) -> "WholeSearch | None":
         """A search that begins with a law that fitted best alone, but at a bound.
 
-        Alone, a law takes the part of another one that is missing too: a winding that gets hotter
-        than any insulation bears, where friction is not known yet. None where there is no such law,
+        Alone, a law also follows the error of another one that is missing: a winding is hotter than
+        any insulation allows where friction is not known yet. None where there is no such law,
         where the search leaves no less than this one, or where a law stays at a bound.
         """
-        if self.beyond is None or self.left() <= self.enough:
+        if self.best_at_bound is None or self.left() <= self.enough:
             return None
         other = WholeSearch(self.own, self.plain, self.found, self.laws, self.enough)
-        first = self.continued(self.beyond)
-        say(f"  whole recordings: {first.law.key} first, which ends at a bound if it is alone")
+        first = self.continued(self.best_at_bound)
+        say(f"  whole recordings: searched again from {first.law.key}, at a bound if alone")
         other.take(first, first.fit, [first, *self.first], say)
         other.first = self.first
         if not other.add(say) or other.left() > self.left():

@@ -64,7 +64,7 @@ class TakenLaws:
         self.ratios: dict[str, float] = {}
         self.tried_forms: set[str] = set()
         self.first: list[Trial] = []
-        self.beyond: Trial | None = None
+        self.best_at_bound: Trial | None = None
 
     def doubt(self) -> float:
         """Units by which a law may lose against a rival by what nothing explains."""

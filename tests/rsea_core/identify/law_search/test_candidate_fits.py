@@ -8,7 +8,10 @@ import pytest
 
 from rsea_core.effects.load_disturbance import disturbance
 from rsea_core.effects.load_unbalance import unbalance
+from rsea_core.identify.candidates.catalogue import catalogue
+from rsea_core.identify.law_search import candidate_fits
 from rsea_core.identify.law_search.candidate_fits import (
+    at_bound,
     cost_of_mass,
     even_ratio,
     gain_of,
@@ -18,7 +21,7 @@ from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import EVEN
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import Hypothesis, MultistepProblem
-from tests.cases.one_axis import pendulum_case
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig, pendulum_case
 
 
 def estimate(likelihood: float) -> Estimate:
@@ -53,6 +56,20 @@ def test_a_value_at_a_bound_that_belongs_to_its_law_is_found_and_others_are_stop
     x = problem.start(h, [(1.0, 0.5, 5.0, 1.0)])  # fifty torques at its peak, flanks throughout
     fit = replace(estimate(0.0), hypothesis=h, x=x)
     assert values_at_bound(problem, fit, law) == ("peak_Nm",)
+
+
+@pytest.mark.parametrize(("rise_K", "bound"), [(350.0, False), (450.0, True)])
+def test_a_fitted_winding_may_be_a_third_hotter_than_insulation_allows(
+    tmp_path, monkeypatch, rise_K, bound
+):
+    rig = replace(axis_rig(), terminal_resistance_ohm=1.0)
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=rig)
+    problem = MultistepProblem(case)
+    law = catalogue(case, relative=True)["drive-thermal/winding, case and magnets"]
+    h = Hypothesis(laws=(law,))
+    fit = replace(estimate(0.0), hypothesis=h, x=problem.start(h, [law.starts[0]]))
+    monkeypatch.setattr(candidate_fits, "peak_rise_K", lambda *given: rise_K)
+    assert at_bound(problem, fit, law) == bound
 
 
 def test_what_each_recording_shows_once_is_even_between_recordings():

@@ -1,6 +1,7 @@
 """Backlash in a train without a spring: the gear's mesh stands for the spring that it lacks."""
 
 import math
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -21,6 +22,8 @@ from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters, with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs
+from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
 from rsea_core.recordings.case import read_case
 
 ROW_s, ROWS, FINER = 2e-3, 1500, 200
@@ -124,6 +127,15 @@ def test_a_model_with_a_mesh_is_read_again(cases, tmp_path):
     path.write_text(model.to_toml(), encoding="utf-8")
     ((law, read),) = FoundModel.from_toml(path).laws
     assert (law.effect, law.law, read) == ("spring-viscoelastic", "damper", values)
+
+
+def test_laws_of_the_rigid_train_are_compared_with_a_search_through_the_mesh(cases):
+    elastic, mesh = with_gear_mesh(cases[WIDTH])
+    rigid, meshed = parameters_alone(cases[WIDTH]), parameters_alone(elastic, mesh)
+    assert rigid.best.x.size != meshed.best.x.size
+    nearly = replace(rigid, estimator=in_sensor_noise(rigid.base_estimator, rigid.base))
+    found = replace(meshed, left_by_parameters=30.0)
+    assert confirmed_by_whole_runs(found, nearly, silent) is nearly
 
 
 def test_no_mesh_joins_a_body_without_inertia(cases):

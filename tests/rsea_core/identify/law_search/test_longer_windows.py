@@ -7,7 +7,7 @@ import pytest
 
 from rsea_core.identify.law_search import longer_windows
 from rsea_core.identify.law_search.hold_out import HeldOut
-from rsea_core.identify.law_search.longer_windows import error_left_beyond, holds_no_further
+from rsea_core.identify.law_search.longer_windows import error_left_beyond, fails_in_longer_windows
 
 
 def found_with(monkeypatch, horizon, plain: float, left: float, *, longer: bool = False):
@@ -60,4 +60,4 @@ def test_laws_that_predict_recordings_held_out_evenly_need_not_hold_in_longer_wi
     monkeypatch, left, ratio, no_further
 ):
     found, _ = found_with(monkeypatch, 1.0, 0.5, left)
-    assert holds_no_further(found, HeldOut(gain=30.0, ratio=ratio)) == no_further
+    assert fails_in_longer_windows(found, HeldOut(gain=30.0, ratio=ratio)) == no_further

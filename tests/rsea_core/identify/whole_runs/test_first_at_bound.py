@@ -30,11 +30,11 @@ def searched(folder, least_Nm_per_rad: float) -> WholeSearch:
 def test_a_law_at_a_bound_is_taken_where_another_law_moves_it_from_there(tmp_path):
     search = searched(tmp_path, 0.016)  # alone 0.014, with friction 0.019
     assert SPRING not in [law.key for law in search.taken]
-    other = search.begun_beyond(lambda text: None)
+    other = search.begun_at_bound(lambda text: None)
     assert {law.key for law in other.taken} == {SPRING, FRICTION}
     assert other.left() < 1.2
     assert not any(at_bound(other.own.problem, other.fit, law) for law in other.taken)
 
 
 def test_a_law_that_stays_at_its_bound_is_not_taken(tmp_path):
-    assert searched(tmp_path, 0.03).begun_beyond(lambda text: None) is None
+    assert searched(tmp_path, 0.03).begun_at_bound(lambda text: None) is None

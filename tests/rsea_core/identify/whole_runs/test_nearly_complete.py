@@ -6,7 +6,7 @@ from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.spring_parallel import SpringParallel
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.search import begun
-from rsea_core.identify.multistep.criteria import COMPLETE, TOGETHER
+from rsea_core.identify.multistep.criteria import COMPLETE, EXPLAINED_TOGETHER
 from rsea_core.identify.whole_runs.complete import with_whole_runs
 from rsea_core.recordings.recording import Recording
 from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig
@@ -32,7 +32,7 @@ def test_two_laws_that_explain_nearly_all_stand_despite_an_error_of_the_log(tmp_
     found, nearly = searched(tmp_path, SPRING, LoadFriction(coulomb_Nm=0.01))
     assert not found.complete
     assert {step.law.effect for step in nearly.steps} == {"spring-parallel", "load-friction"}
-    assert TOGETHER < nearly.explained < 1.0
+    assert EXPLAINED_TOGETHER < nearly.explained < 1.0
     left = nearly.estimator.innovations([(nearly.best.hypothesis, nearly.best.x)])
     assert np.sqrt(np.mean(left[0][0] ** 2)) > COMPLETE
 
