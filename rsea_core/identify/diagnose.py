@@ -5,7 +5,8 @@ bridge, every sensor and rows of a millisecond (`is_bench`). Everywhere else law
 predictions over windows with estimated starts and an estimated noise (`multistep`). Where that
 leaves dependent innovations - no law fits the machine quite - free runs are a second opinion, and
 the model that predicts the recordings held out better speaks. The bench asks windows so where its
-free runs find no name: these do not know the errors of a log, as an amplifier's offset.
+free runs find no name, or names that leave much: these do not know the errors of a log, as an
+amplifier's offset.
 """
 
 from collections.abc import Callable
@@ -14,7 +15,12 @@ import numpy as np
 
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
-from rsea_core.identify.multistep.criteria import DOUBTED_SHARE, NEEDS_NO_WINDOWS, NO_PREDICTION
+from rsea_core.identify.multistep.criteria import (
+    DOUBTED_SHARE,
+    EXPLAINED,
+    NEEDS_NO_WINDOWS,
+    NO_PREDICTION,
+)
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.numeric.threads import on_one_blas_thread
@@ -69,6 +75,10 @@ def diagnose(
         )
     if is_bench(case):
         found = diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
+        if not quick and _leaves_much(found):
+            say("the laws named leave much: a second opinion by windows")
+            other = diagnose_windows(case, say=say)
+            return other if other.conclusion.found.complete else found
         if quick or not case.validation or found.document["verdict"] != "unexplained":
             return found
         say("no name fits: a second opinion by windows, which model the errors of the log")
@@ -86,6 +96,12 @@ def diagnose(
         return found
     say("innovations stay dependent: a second opinion by free runs")
     return _better(found, lambda: diagnose_free_runs(case, thorough=thorough, say=say), say)
+
+
+def _leaves_much(found: Diagnosis) -> bool:
+    """Whether laws named by free runs leave a large share of what parameters leave."""
+    named = found.document["verdict"] == "missing-physics"
+    return named and found.conclusion.explained_excess() < EXPLAINED
 
 
 def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis:

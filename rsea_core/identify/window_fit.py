@@ -9,7 +9,12 @@ from numpy.typing import NDArray
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.candidates.rig_parameters import Nominal
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.judgement.covariance import Spread
+from rsea_core.identify.judgement.covariance import (
+    Spread,
+    jackknife_of_moving,
+    known_before,
+    no_wider,
+)
 from rsea_core.identify.law_search.found import Step
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
@@ -24,7 +29,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
-from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.identify.multistep.kalman_filter import huber_squares, huber_weights
 from rsea_core.machine.inputs import POSITION_COMMAND
 
 DAMPING, INDUCTANCE = "viscous_Nms_per_rad", "terminal_inductance_H"
@@ -65,19 +70,35 @@ def fit_of(estimator: Estimator, fit: Estimate) -> FoundFit:
 
 
 def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
-    """Covariances of the unknowns: white innovations, and the scatter of the blocks' gradients."""
+    """Covariances of the unknowns, of which each figure takes the largest.
+
+    White innovations of the power that is left; the scatter of the gradients of stretches; the
+    jackknife over stretches and over recordings (`judgement.covariance`). No direction is wider
+    than its prior.
+    """
     level, columns = estimator.jacobian(fit.hypothesis, fit.x)
     _, weight = estimator.problem.prior(fit.hypothesis)
     n = fit.x.size
-    hessian, middle = np.diag(weight**2), np.diag(weight**2)
+    prior = np.diag(weight**2)
+    pieces, gradients, apart = [], [], []
     for block, e, J in zip(stretches_of(estimator.tracks), level, columns, strict=True):
-        flat = J.reshape(n, -1)
-        hessian = hessian + flat @ flat.T
-        gradient = np.einsum("itc,tc->it", J, e)
-        sums = np.array([np.bincount(block, g) for g in gradient])
-        middle = middle + sums @ sums.T
-    inverse = np.linalg.inv(hessian + 1e-9 * np.eye(n))
-    return Spread(sources=(inverse, inverse @ middle @ inverse))
+        w = huber_weights(e)
+        for own in (block == b for b in range(block[-1] + 1)):
+            part = J[:, own].reshape(n, -1)
+            pieces.append((part * w[own].ravel()) @ part.T)
+            gradients.append(part @ (w * e)[own].ravel())
+        count = block[-1] + 1
+        apart.append((sum(pieces[-count:]), sum(gradients[-count:])))
+    inverse = np.linalg.inv(sum(pieces) + prior + 1e-9 * np.eye(n))
+    middle = prior + sum(np.outer(g, g) for g in gradients)
+    white = inverse * max(float(np.mean([np.mean(huber_squares(e)) for e in level])), 1.0)
+    hessians, slopes = zip(*apart, strict=True)
+    sources = (
+        white, inverse @ middle @ inverse, jackknife_of_moving(pieces, gradients, prior),
+        jackknife_of_moving(hessians, slopes, prior),
+    )  # fmt: skip
+    known = known_before(white, weight)
+    return Spread(sources=tuple(no_wider(C, known) for C in sources))
 
 
 def strained_value(problem: MultistepProblem, fit: FoundFit) -> Nominal | None:

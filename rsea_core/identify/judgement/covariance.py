@@ -108,17 +108,8 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     # a fit has taken part of the scatter away; never less than white innovations of that MSNI
     white = inverse * max(tempering * float(fit.msni.mean()), 1.0)
     sandwich = inverse @ (middle + prior) @ inverse
-    # a value that one recording alone informs runs off without it: it is held there, and pieces
-    # of recordings say how far it moves
-    moving = _lost_without_one(hessians, prior) <= ALONE
-    apart = np.zeros((n, n))
-    if moving.any():
-        square = np.ix_(moving, moving)
-        apart[square] = jackknife(
-            [H[square] for H in hessians], [g[moving] for g in bench_gradients], prior[square]
-        )
-    far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
-    known = np.where(weight > 0.0, weight, 1.0 / far)
+    apart = jackknife_of_moving(hessians, bench_gradients, prior)
+    known = known_before(white, weight)
     # what the innovations cannot show joins each source: it is the same in every block
     gain = tempering * inverse
     counts = [gain @ g for g in pulls_of(found, counts_of(problem, fit))]
@@ -160,6 +151,20 @@ def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDA
     return [H[:, i] * sizes[i] for H in pieces for i in acting]
 
 
+def known_before(white: NDArray, weight: NDArray) -> NDArray:
+    """Inverse deviations (n,) of the priors; of values without one, by `NO_PRIOR`.
+
+    Parameters
+    ----------
+    white : (n, n) array
+        Covariance by white innovations.
+    weight : (n,) array
+        Inverse deviations of the priors; 0 without one.
+    """
+    far = NO_PRIOR * np.sqrt(np.maximum(np.diag(white), 1e-300))
+    return np.where(weight > 0.0, weight, 1.0 / far)
+
+
 def no_wider(covariance: NDArray, weight: NDArray) -> NDArray:
     """The covariance (n, n) with no direction wider than its prior (1/weight, (n,)).
 
@@ -172,10 +177,24 @@ def no_wider(covariance: NDArray, weight: NDArray) -> NDArray:
 
 def _lost_without_one(hessians: Sequence[NDArray], prior: NDArray) -> NDArray:
     """By how much the variance of each unknown grows (n,) without the recording it needs most."""
-    n = prior.shape[0]
-    whole = sum(hessians) + prior + 1e-9 * np.eye(n)
-    own = np.diag(np.linalg.inv(whole))
-    return np.max([np.diag(np.linalg.inv(whole - H)) / own for H in hessians], axis=0)
+    own = _variances(sum(hessians) + prior + 1e-9 * np.eye(len(prior)))
+    return np.max([_variances(H) for H in _without_each(hessians, prior)], axis=0) / own
+
+
+def _variances(hessian: NDArray) -> NDArray:
+    """Variances (n,) of unknowns by a Hessian (n, n) that may be singular but for round-off."""
+    scale = np.sqrt(np.diag(hessian))
+    values, vectors = np.linalg.eigh(hessian / np.outer(scale, scale))
+    return np.sum(vectors**2 / np.maximum(values, 1e-12), axis=1) / scale**2
+
+
+def _without_each(hessians: Sequence[NDArray], prior: NDArray) -> list[NDArray]:
+    """Sums of all but one of the Hessians (n, n), with the prior's: differences would cancel."""
+    ridge = prior + 1e-9 * np.eye(len(prior))
+    return [
+        sum((H for k, H in enumerate(hessians) if k != left_out), ridge)
+        for left_out in range(len(hessians))
+    ]
 
 
 def jackknife(
@@ -197,12 +216,28 @@ def jackknife(
     n, count = prior.shape[0], len(hessians)
     if count < 2:
         return np.zeros((n, n))
-    whole = sum(hessians) + prior + 1e-9 * np.eye(n)
-    moves = np.array(
-        [np.linalg.solve(whole - H, g) for H, g in zip(hessians, bench_gradients, strict=True)]
-    )
+    others = _without_each(hessians, prior)
+    moves = np.array([np.linalg.solve(H, g) for H, g in zip(others, bench_gradients, strict=True)])
     moves = moves - moves.mean(axis=0)
     return (count - 1) / count * moves.T @ moves
+
+
+def jackknife_of_moving(
+    hessians: Sequence[NDArray], gradients: Sequence[NDArray], prior: NDArray
+) -> NDArray:
+    """`jackknife` of the values that no single recording, or piece of one, determines.
+
+    A value that one of them alone informs runs off without it: it is held there (zero), and other
+    sources say how far it moves.
+    """
+    moving = _lost_without_one(hessians, prior) <= ALONE
+    found = np.zeros(prior.shape)
+    if moving.any():
+        square = np.ix_(moving, moving)
+        found[square] = jackknife(
+            [H[square] for H in hessians], [g[moving] for g in gradients], prior[square]
+        )
+    return found
 
 
 def between_laws(value: float, others: Sequence[tuple[float, float]], temperature: float) -> float:

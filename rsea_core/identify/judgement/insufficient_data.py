@@ -9,7 +9,8 @@ hidden, or all those of one part of the machine, the nominal model is not confir
 
 Something was found: does it hang on one recording? A law chosen by the only recording is checked
 by no other, and a bridge is not exactly repeatable; so where another effect, or none at all, leaves
-less than three times the noise there, a second recording has to confirm it.
+less than three times the noise there and is not three standard errors behind, a second recording
+has to confirm it.
 """
 
 from collections.abc import Sequence
@@ -21,6 +22,7 @@ from rsea_core.identify.experiment.experiment_file import Judged, experiment_of
 from rsea_core.identify.experiment.next_experiment import DECIDES, NextExperiment
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis, Problem
+from rsea_core.identify.judgement.alternatives import distance_errors
 from rsea_core.identify.judgement.criteria import MOST_UNDETECTABLE
 from rsea_core.identify.judgement.detectability import DetectableSize, minimum_detectable_sizes
 from rsea_core.identify.selection.criteria import Search
@@ -147,6 +149,12 @@ def _unconfirmed(search: Search, best: Fit) -> list[tuple[str, tuple[Fit, Fit]]]
     if len(search.problem.fitted) > 1:
         return []
     mine = set(best.hypothesis.effects)
+    near = [
+        rival for rival in search.ranked()
+        if set(rival.hypothesis.effects) != mine
+        and len(rival.hypothesis.effects) <= len(mine)
+        and np.sqrt(rival.msni[0]) < DECIDES
+    ]  # fmt: skip
     return [
         (
             f"Likely {' and '.join(best.hypothesis.effects)}, but one recording alone shows it, and"
@@ -154,10 +162,8 @@ def _unconfirmed(search: Search, best: Fit) -> list[tuple[str, tuple[Fit, Fit]]]
             " noise: another one has to confirm it.",
             (best, rival),
         )
-        for rival in search.ranked()
-        if set(rival.hypothesis.effects) != mine
-        and len(rival.hypothesis.effects) <= len(mine)
-        and np.sqrt(rival.msni[0]) < DECIDES
+        for rival, error in zip(near, distance_errors(search, best, near), strict=True)
+        if search.behind(best, rival) < DECIDES * error
     ]
 
 

@@ -62,8 +62,8 @@ class WholeSearch(TakenLaws):
         self.take(best, self.to_minimum(best), trials, say)
         return True
 
-    def add_small(self, trials: Sequence[Trial], say) -> bool:
-        """Take a law that gains little, if it explains most of what is left; whether one does.
+    def add_small(self, trials: Sequence[Trial], say, share: float = EXPLAINED) -> bool:
+        """Take a law that gains little, if it explains a share of what is left; whether one does.
 
         Beside a large effect a small one gains a small share of the cost. A wrong law explains only
         part of the errors that an inexact form of another law leaves. A torque that acts once can
@@ -71,25 +71,35 @@ class WholeSearch(TakenLaws):
         """
         before = self.excess()
         lasting = [t for t in trials if t.law.effect != LoadDisturbance.effect]
-        tried = [(t, EXPLAINED) for t in lasting[:1]]
+        tried = [(t, share) for t in lasting[:1]]
         if trials and (not lasting or trials[0] is not lasting[0]):
             tried.insert(0, (trials[0], NEEDS_NO_WINDOWS))
         for best, least in tried:
             if not self.taken or best.gain < NEARLY_EXPLAINED * before:
                 continue
             fit = self.to_minimum(best)
-            share = 1.0 - excess(self.own, fit.hypothesis, fit.x) / before
-            say(f"  whole recordings: {best.law.key} explains {share:.2f} of what others leave")
-            if share >= least:
+            found = 1.0 - excess(self.own, fit.hypothesis, fit.x) / before
+            say(f"  whole recordings: {best.law.key} explains {found:.2f} of what others leave")
+            if found >= least:
                 self.take(best, fit, trials, say)
                 return True
         return False
 
-    def add_last(self, say) -> bool:
-        """Take a small law beside a complete one where it explains what is left beyond noise."""
+    def add_last(self, say, share: float = EXPLAINED) -> bool:
+        """Take a small law beside complete ones, which explains a share of what they leave.
+
+        It must predict rows unseen. What it explains, a form of the laws before with more values
+        may have followed: beside it their plainer forms are tried.
+        """
         if self.excess() < LEAST_EXCESS or not 0 < len(self.taken) < WHOLE_LAWS:
             return False
-        return self.add_small(self.trials(), say)
+        if not self.add_small(self.trials(), say, share):
+            return False
+        for law in tuple(self.taken[:-1]):
+            self.plainer_form(law, say, -self.doubt())
+        self.compare(say, last=True)
+        self.predict(say)
+        return True
 
     def trials(self) -> list[Trial]:
         """Candidates fitted beside what was taken, best first."""

@@ -174,8 +174,14 @@ class TakenLaws:
         ]
         return [(law, t) for t in trials if t is not None]
 
-    def plainer_form(self, law: Law, say) -> bool:
-        """Take the best plainer form of a law that ends at a bound; whether one ends at none."""
+    def plainer_form(self, law: Law, say, least: float = -np.inf) -> bool:
+        """Take the best plainer form of a law; whether one ends at no bound and gains enough.
+
+        Parameters
+        ----------
+        least : float
+            Gain: below zero what a plainer form may lose.
+        """
         own, h = self.own, self.fit.hypothesis
         known = own.problem.values(h, self.fit.x)[1][h.laws.index(law)]
         base = without(own, self.fit, law)
@@ -183,9 +189,10 @@ class TakenLaws:
         begun = [begun_with(own, base, w, known, others) for w in self.laws if holds(law, w)]
         ends = [self.in_place_of(law, converged(own, *start[1:])) for start in begun]
         best = max(filter(None, ends), key=lambda t: t.gain, default=None)
-        if best is not None:
-            self.replaced(law, best, say)
-        return best is not None
+        if best is None or best.gain < least:
+            return False
+        self.replaced(law, best, say)
+        return True
 
     def replaced(self, law: Law, trial: Trial, say) -> None:
         """A law replaced by the one of a trial."""

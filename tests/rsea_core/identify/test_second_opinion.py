@@ -1,4 +1,4 @@
-"""A second opinion by free runs replaces the first only where it predicts, and clearly better."""
+"""A second opinion replaces the first only where it predicts clearly better, or is complete."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -40,6 +40,28 @@ def test_free_runs_replace_windows_only_where_they_predict_clearly_better(
     case = replace(case, recordings=(*case.recordings, held_out))
     alone = 10.0 * max(windows, free_runs)
     opinions = {"windows": opinion(windows, alone), "free runs": opinion(free_runs, alone)}
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
+    assert diagnose(case) is opinions[taken]
+
+
+@pytest.mark.parametrize(
+    ("explained", "complete", "taken"),
+    [
+        (0.74, True, "windows"),
+        (0.74, False, "free runs"),
+        (0.99, True, "free runs"),  # windows are not asked
+    ],
+)
+def test_complete_laws_of_windows_replace_those_of_free_runs_that_leave_much(
+    tmp_path, monkeypatch, explained, complete, taken
+):
+    """An offset of a current was claimed in place of dry friction (blind case 10001/013)."""
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    opinions = {name: opinion(0.1, 1.0) for name in ("windows", "free runs")}
+    opinions["windows"].conclusion.found.complete = complete
+    opinions["free runs"].conclusion.explained_excess = lambda: explained
+    monkeypatch.setattr(f"{HERE}.is_bench", lambda case: True)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
     assert diagnose(case) is opinions[taken]

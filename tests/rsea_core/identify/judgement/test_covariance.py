@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from rsea_core.identify.judgement.covariance import Spread, between_laws, jackknife
+from rsea_core.identify.judgement.covariance import (
+    Spread,
+    between_laws,
+    jackknife,
+    jackknife_of_moving,
+)
 
 
 def _recordings(rng: np.random.Generator, common: float, count: int = 5):
@@ -41,6 +46,15 @@ def test_a_single_recording_has_no_jackknife():
     recordings = _recordings(np.random.default_rng(1), common=0.5, count=1)
     x = _solve(recordings, np.eye(2))
     assert not jackknife(*_parts(recordings, x), np.eye(2)).any()
+
+
+def test_a_value_that_one_recording_alone_informs_is_held_in_the_jackknife():
+    recordings = _recordings(np.random.default_rng(2), common=0.5)
+    one = [(J * [1.0, b == 0], y) for b, (J, y) in enumerate(recordings)]
+    x = _solve(one, 1e-6 * np.eye(2))
+    found = jackknife_of_moving(*_parts(one, x), np.zeros((2, 2)))
+    assert found[0, 0] > 0.0
+    assert not found[1].any()
 
 
 def test_jackknife_sees_errors_that_hold_all_through_a_recording_and_white_noise_does_not():

@@ -166,7 +166,7 @@ def test_part_whose_effects_are_undetectable_is_untested(clamped):
 
 def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     friction, _ = chosen(clamped, "gear-friction")
-    faint = GearFriction(coulomb_Nm=0.4 * friction.starts[0][0])
+    faint = GearFriction(coulomb_Nm=0.15 * friction.starts[0][0])
     one = with_effect(search_of((LOCKED, SLOW), terms=(faint,), folder=tmp_path), friction)
     assert np.sqrt(one.parameters.msni[0]) < DECIDES
     conclusion = Conclusion(one)
@@ -175,6 +175,18 @@ def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     assert conclusion.effects()[0]["confidence"] <= UNDECIDED_CONFIDENCE
     assert location_of(conclusion)["subsystem"] == "gear"
     assert decisive_experiment(conclusion).best.separation > DECIDES
+
+
+def test_effect_of_one_recording_that_is_many_standard_errors_ahead_waits_for_none(
+    clamped, tmp_path
+):
+    friction, _ = chosen(clamped, "gear-friction")
+    small = GearFriction(coulomb_Nm=0.4 * friction.starts[0][0])
+    one = with_effect(search_of((LOCKED, SLOW), terms=(small,), folder=tmp_path), friction)
+    assert np.sqrt(one.parameters.msni[0]) < DECIDES  # parameters alone leave little
+    conclusion = Conclusion(one)
+    assert conclusion.verdict == "missing-physics"
+    assert conclusion.question is None
 
 
 @pytest.mark.parametrize("made", [((LOCKED, SLOW),), ((LOCKED, SLOW), (LOCKED, 1.4 * SLOW))])

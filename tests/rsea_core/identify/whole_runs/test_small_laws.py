@@ -1,5 +1,6 @@
 """A law that is small beside another one is found if it explains what that one leaves."""
 
+import numpy as np
 import pytest
 
 from rsea_core.effects.load_disturbance import LoadDisturbance
@@ -60,3 +61,20 @@ def test_a_complete_model_leaves_the_noise_of_the_counts(tmp_path):
     # parameters alone explain single counts by an unknown torque and underestimate the noise
     stiff = SpringParallel(stiffness_Nm_per_rad=0.3)
     assert sprung(tmp_path, stiff, seed=2).left() < 1.2
+
+
+@pytest.mark.parametrize(("share", "taken"), [(1.01, False), (0.5, True)])
+def test_a_further_law_must_explain_a_stated_share_of_what_others_leave(tmp_path, share, taken):
+    assert sprung(tmp_path, STIFF, SMALL).add_last(lambda text: None, share) == taken
+
+
+def test_a_plainer_form_takes_the_place_of_one_whose_further_values_explain_nothing(tmp_path):
+    found, own, plain = searched_axis(tmp_path, axis_recording(STIFF, seed=1), timing=AS_LOGGED)
+    forms = {law.key: law for law in laws_of(found)}
+    search = WholeSearch(own, plain, found, [forms["spring-parallel/cubic"]], 0.0)
+    assert search.add(lambda text: None)
+    search.laws = list(forms.values())
+    taken = search.taken[0]
+    assert not search.plainer_form(taken, lambda text: None, least=np.inf)
+    assert search.plainer_form(taken, lambda text: None, least=0.0)
+    assert [law.key for law in search.taken] == [SPRING]

@@ -13,7 +13,14 @@ from rsea_core.identify.law_search.hold_out import part_of
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Projection, screen
 from rsea_core.identify.law_search.search import laws_of
-from rsea_core.identify.whole_runs.unseen import needed, recordings_held_out, unseen_share, without
+from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.identify.whole_runs.unseen import (
+    needed,
+    predicted_cost,
+    recordings_held_out,
+    unseen_share,
+    without,
+)
 from tests.cases.one_axis import axis_recording
 from tests.cases.whole_runs import searched_axis
 
@@ -90,3 +97,21 @@ def test_a_fit_without_a_law_is_that_of_the_others(sprung, true_law):
     assert less.hypothesis.laws == plain.hypothesis.laws
     assert less.cost == pytest.approx(plain.cost, rel=1e-3)
     assert np.all(np.isfinite(less.x))
+
+
+def test_values_may_move_in_a_prediction_as_far_as_the_fit_does_not_know_them(sprung, true_law):
+    _, own, _ = sprung
+    h, x = true_law.hypothesis, own.fit(true_law.hypothesis, true_law.x, iterations=12).x
+    best = cost_of(own, h, x)
+    few = own.having([replace(t, seen=0.05) for t in own.tracks])
+    index = [p.key for p in own.problem.nominals].index("load_inertia_kgm2")
+    moved = x + 0.1 * np.eye(x.size)[index]
+    wrong = cost_of(own, h, moved) - best
+    assert wrong > 100.0
+    little, much = (predicted_cost(own, fitted, h, moved) - best for fitted in (few, own))
+    assert 0.0 <= little < 0.1 * wrong  # few rows do not show the value
+    assert much > 5.0 * little  # all rows do
+
+
+def cost_of(own, h, x) -> float:
+    return 0.5 * sum(float(np.sum(huber_squares(e))) for e in own.innovations([(h, x)]))
