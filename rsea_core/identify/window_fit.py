@@ -92,10 +92,10 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
     inverse = np.linalg.inv(sum(pieces) + prior + 1e-9 * np.eye(n))
     middle = prior + sum(np.outer(g, g) for g in gradients)
     white = inverse * max(float(np.mean([np.mean(huber_squares(e)) for e in level])), 1.0)
-    hessians, slopes = zip(*apart, strict=True)
+    hessians, of_each = zip(*apart, strict=True)
     sources = (
         white, inverse @ middle @ inverse, jackknife_of_moving(pieces, gradients, prior),
-        jackknife_of_moving(hessians, slopes, prior),
+        jackknife_of_moving(hessians, of_each, prior),
     )  # fmt: skip
     known = known_before(white, weight)
     return Spread(sources=tuple(no_wider(C, known) for C in sources))
