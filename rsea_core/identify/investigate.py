@@ -25,6 +25,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.horizons import likelier, relative_error, with_better_timing
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
+from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
 from rsea_core.recordings.case import Case
 
 
@@ -38,13 +39,19 @@ def investigate(
     quick : bool
         Finish fewer candidates, each from one start.
     """
-    case, shared = with_shared_recordings(case)
+    recorded = case
+    case, shared = with_shared_recordings(recorded)
     for file, why in shared.items():
         say(f"{file}: two thirds are fitted: {why}")
     found = begun(case, None, say, quick=quick)
     nearly = None
     if not quick:
         found, nearly = with_whole_runs(found, say)
+        missed = unpredicted_recordings(found) if found.sound and not found.complete else []
+        if missed:
+            case, shared = with_shared_recordings(recorded, missed)
+            say(f"{', '.join(missed)}: parameters that suffice for the others do not predict it")
+            found, nearly = with_whole_runs(begun(case, None, say), say)
         if nearly is not None and nearly.explained > NEEDS_NO_WINDOWS:
             found = nearly
     if not (found.complete or found.sound):

@@ -7,6 +7,7 @@ recordings held out let the load move, or include a contact, the others show not
 thirds of these are fitted then, and the last third stays held out.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,8 +46,15 @@ def part_of(r: Recording, first: int, last: int, **changes) -> Recording:
     return replace(r, columns=columns, logged=logged, **begun, **changes)
 
 
-def with_shared_recordings(case: Case) -> tuple[Case, dict[str, str]]:
+def with_shared_recordings(
+    case: Case, unpredicted: Sequence[str] = ()
+) -> tuple[Case, dict[str, str]]:
     """The case with two thirds of the recordings fitted that alone show a kind of load.
+
+    Parameters
+    ----------
+    unpredicted : sequence of str
+        Files of further recordings held out, which what explains the others does not predict.
 
     Returns
     -------
@@ -60,6 +68,8 @@ def with_shared_recordings(case: Case) -> tuple[Case, dict[str, str]]:
         why = None
         if r.role == "validation" and not r.quasi_static:
             why = _only_there(r.load.kind, kinds)
+            if why is None and r.file in unpredicted:
+                why = "it differs from what explains the recordings fitted"
         cut = int(SHARED * r.rows)
         if why is not None and cut >= LEAST_ROWS and r.rows - cut >= LEAST_ROWS:
             recordings += [part_of(r, 0, cut, role="identification"), part_of(r, cut, r.rows)]

@@ -22,6 +22,7 @@ from rsea_core.identify.multistep.criteria import (
     FITTED_ROWS,
     KEPT_RATIO,
     NEGLIGIBLE_INCREASE,
+    SOUND,
     UNPREDICTED,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -62,6 +63,25 @@ def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, s
         predicted_cost(recordings_held_out(found, own, trial), own, *trial) for trial in trials
     ]
     return share if costs[0] < (NEGLIGIBLE_INCREASE if once else 1.0) * costs[1] else np.inf
+
+
+def unpredicted_recordings(found: Found) -> list[str]:
+    """Files of recordings held out that sufficient parameters do not predict.
+
+    Parameters suffice for what the recordings fitted show; a faster or larger motion may show more.
+    """
+    if not any(b.recording.role == "validation" for b in found.problem.benches):
+        return []
+    own = in_sensor_noise(found.base_estimator, found.base)
+    plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
+    trial = plain.hypothesis, plain.x
+    files = []
+    for t in recordings_held_out(found, own, trial).tracks:
+        one = own.having([t])
+        cost = predicted_cost(one, own, *trial)
+        if 2.0 * cost > SOUND**2 * t.blocks * len(t.experiment.channels):
+            files.append(t.experiment.recording.file)
+    return files
 
 
 def recordings_held_out(

@@ -65,6 +65,14 @@ def test_the_only_recording_with_a_contact_is_shared(tmp_path):
     assert with_shared_recordings(both)[1] == {}
 
 
+def test_a_recording_that_is_not_predicted_is_shared(tmp_path):
+    unpredicted = axis_recording(seed=2, role="validation")
+    case = axis_case(tmp_path, axis_recording(seed=1), unpredicted, rig=axis_rig())
+    shared, files = with_shared_recordings(case, [unpredicted.file])
+    assert list(files) == [unpredicted.file]
+    assert [r.role for r in shared.recordings] == ["identification"] * 2 + ["validation"]
+
+
 @pytest.mark.parametrize("fitted", [1, 2])
 def test_a_recording_held_out_shows_how_long_the_motor_rested_before_it(tmp_path, fitted):
     """Each recording was made cold; of several fitted ones the pause is fitted too, and stays."""

@@ -18,6 +18,7 @@ from rsea_core.identify.whole_runs.unseen import (
     needed,
     predicted_cost,
     recordings_held_out,
+    unpredicted_recordings,
     unseen_share,
     without,
 )
@@ -97,6 +98,14 @@ def test_a_fit_without_a_law_is_that_of_the_others(sprung, true_law):
     assert less.hypothesis.laws == plain.hypothesis.laws
     assert less.cost == pytest.approx(plain.cost, rel=1e-3)
     assert np.all(np.isfinite(less.x))
+
+
+@pytest.mark.parametrize("terms", [(), (SPRING,)])
+def test_recordings_held_out_that_parameters_do_not_predict_are_listed(tmp_path, terms):
+    """What the fitted recording does not show: here the machine is another one."""
+    other = axis_recording(*terms, seed=6, role="validation")
+    found, _, _ = searched_axis(tmp_path, axis_recording(seed=5), other)
+    assert unpredicted_recordings(found) == [other.file] * len(terms)
 
 
 def test_values_may_move_in_a_prediction_as_far_as_the_fit_does_not_know_them(sprung, true_law):
