@@ -13,6 +13,7 @@ import numpy as np
 
 from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
 from rsea_core.identify.law_search.pulses import pulses
@@ -37,6 +38,7 @@ from rsea_core.identify.multistep.criteria import (
     WHOLE_RIVALS,
 )
 from rsea_core.identify.multistep.estimator import Estimate
+from rsea_core.identify.multistep.experiment import ANGLES
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
 from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
 from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
@@ -298,6 +300,7 @@ def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
     Every machine has friction: where it explains as much, no dead zone of the drive is named.
+    Encoders have whole counts: where a spring explains as much, no scale factor of an angle is.
     Uneven rows of a log leave an error in proportion to the gain, which further values can fit.
     Of equally plain laws that one is taken which keeps the machine closest to its rig file: two
     encoders that disagree by a factor do not tell which of them is wrong.
@@ -309,6 +312,7 @@ def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
         alike,
         key=lambda t: (
             t.law.effect == DriveDeadZone.effect,
+            t.law.effect == SensorScale.effect and t.law.sensor in ANGLES,
             count_values(t.law),
             t.fit.prior_cost,
             -t.gain,
