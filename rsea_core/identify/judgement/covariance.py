@@ -217,7 +217,9 @@ def jackknife(
     if count < 2:
         return np.zeros((n, n))
     others = _without_each(hessians, prior)
-    moves = np.array([np.linalg.solve(H, g) for H, g in zip(others, bench_gradients, strict=True)])
+    moves = np.array(  # least squares: two values that rows do not tell apart leave no inverse
+        [np.linalg.lstsq(H, g, rcond=None)[0] for H, g in zip(others, bench_gradients, strict=True)]
+    )
     moves = moves - moves.mean(axis=0)
     return (count - 1) / count * moves.T @ moves
 

@@ -4,7 +4,8 @@ Recordings that the case holds out serve as they are. A case without any, or wit
 laws do not concern, lends the last quarter of
 each recording: both hypotheses are fitted to the rows before it once more. If only
 recordings held out let the load move, or include a contact, the others show nothing of it: two
-thirds of these are fitted then, and the last third stays held out.
+thirds of these are fitted then, and the last third stays held out. So are two thirds of recordings
+that parameters do not predict, although these suffice for those fitted.
 """
 
 from collections.abc import Sequence
