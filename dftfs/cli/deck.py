@@ -3,10 +3,10 @@
 import argparse
 
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
-from dftfs.cli.output import default_folder
+from dftfs.cli.output import default_folder, prepared
 from dftfs.cli.spring_options import add_mesh, mesh_of
 from dftfs.errors import DesignError
-from dftfs.files import prepare_folder, refuse_existing, write_text
+from dftfs.files import refuse_existing, write_text
 
 _ABOUT = (
     "half of the width (the mid-plane is a mirror): torque = 2 x moment of the bore's reactions"
@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
     steps = {folder / f"{name}-{k:03d}.vtu": t for k, t in enumerate(at, 1)}
     files |= {"steps": folder / f"{name}.pvd", "torque": folder / f"torque-{name}.csv"}
     refuse_existing([*files.values(), *steps], force=arguments.force)
-    prepare_folder(folder)
+    prepared(arguments, folder)
     ring = ring_of(problem)
     say(f"{name}: {len(ring.cells)} elements, {len(ring.nodes)} nodes")
     found = ring_steps(problem, at)

@@ -8,7 +8,8 @@ from dftfs.analysis.study.drawing_tolerance import drawing_tolerance
 from dftfs.cad.drawing_sheet import SHEETS_MM, STANDARD_SCALE, BoltCircle, ShopData, chosen_sheet
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design
 from dftfs.cli.mount import add_bolts, bolts
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes
+from dftfs.cli.output import prepared
+from dftfs.files import refuse_existing, to_json, write_bytes
 from dftfs.process import builtin_processes, find_process
 
 
@@ -63,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
     circles = tuple(BoltCircle(where=where, **sizes) for where, sizes in given.items() if sizes)
     for circle in circles:
         circle.check(design)
-    folder = prepare_folder(arguments.out or Path("out") / f"deliver-{design.name}")
+    folder = prepared(arguments, arguments.out or Path("out") / f"deliver-{design.name}")
     target = folder / f"{design.name}-{arguments.revision}.zip"
     refuse_existing([target], force=arguments.force)
     tolerance = drawing_tolerance(design, process, share=arguments.yield_percent / 100)

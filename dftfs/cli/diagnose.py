@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dftfs.cli.common import emit, progress
 from dftfs.cli.diagnose_routes import Result, moving_machine, spring_bench, steady_map
-from dftfs.cli.output import add_pdf, output_folder, print_page
+from dftfs.cli.output import add_pdf, output_folder, prepared, print_page
 from dftfs.cli.own_effects import add_effects, load_own_effects
 from dftfs.errors import DftfsError
 from dftfs.staging import reason, staging_folder
@@ -43,7 +43,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, diagnose, write."""
-    from dftfs.files import prepare_folder, refuse_existing
+    from dftfs.files import refuse_existing
     from rsea_core.identify.spring_bench.diagnose import is_spring_bench
     from rsea_core.recordings.case import read_case
 
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         )
     paths: dict[str, Path] = {}
     if arguments.out is not None:  # a given folder is refused before the work, a new one made after
-        folder = prepare_folder(arguments.out)
+        folder = prepared(arguments, arguments.out)
         paths = {name: folder / name for name in FILES}
         every = [folder / name for name in (*FILES, *SOMETIMES)]
         refuse_existing(every, force=arguments.force)

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from dftfs import __version__
 from dftfs.cli.common import emit, progress, table
+from dftfs.cli.output import prepared
 
 PAGE = "doctor.html"
 
@@ -27,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _recordings(arguments: argparse.Namespace) -> int:
     """Look at every recording; corrupt copies; write the page."""
-    from dftfs.files import prepare_folder, refuse_existing
+    from dftfs.files import refuse_existing
     from dftfs.report.page_data import write_page
     from dftfs.report.provenance import case_provenance
     from rsea_core.importing.doctor.health import health
@@ -59,7 +60,7 @@ def _recordings(arguments: argparse.Namespace) -> int:
         states = {True: "noticed", False: "would pass", None: "does not apply"}
         rows += [("forty slips", r.name, states[r.noticed], r.text) for r in results]
         page = write_page(
-            prepare_folder(arguments.out) / PAGE, "recordings",
+            prepared(arguments, arguments.out) / PAGE, "recordings",
             title=f"{case.name}: health of its recordings",
             head=("recording", "column", "measure", "found"), rows=rows,
             notes=list(dict.fromkeys(notes)),

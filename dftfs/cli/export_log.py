@@ -6,8 +6,9 @@ import os
 from pathlib import Path
 
 from dftfs.cli.common import emit
+from dftfs.cli.output import prepared
 from dftfs.errors import DftfsError
-from dftfs.files import prepare_folder, refuse_existing, write_text
+from dftfs.files import refuse_existing, write_text
 from rsea_core.errors import RecordingError
 from rsea_core.interop.mjcf import to_mjcf
 from rsea_core.interop.urdf import to_urdf
@@ -40,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     if ending not in FORMATS:
         raise DftfsError(f"--format {ending} is of a machine, and {arguments.source} a case")
     case = read_case(arguments.source)
-    folder = prepare_folder(arguments.out)
+    folder = prepared(arguments, arguments.out)
     stems = [_stem(r.file) for r in case.recordings]
     if len(set(stems)) < len(stems):
         stems = [f"{k + 1}-{stem}" for k, stem in enumerate(stems)]
@@ -108,7 +109,7 @@ def _machine(arguments: argparse.Namespace) -> int:
     made = write(model, **({} if name == "URDF" else {"command_name": command}))
     path = arguments.out / f"{arguments.source.stem}{ending}"
     refuse_existing([path], force=arguments.force)
-    write_text(prepare_folder(arguments.out) / path.name, made.text)
+    write_text(prepared(arguments, arguments.out) / path.name, made.text)
     lines = [str(path), *(f"{name} cannot hold {what}" for what in made.left_out)]
     emit({"file": path, "left_out": made.left_out}, "\n".join(lines), as_json=arguments.json)
     return 0

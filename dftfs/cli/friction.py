@@ -4,8 +4,8 @@ import argparse
 from pathlib import Path
 
 from dftfs.cli.common import add_output, emit, table
-from dftfs.cli.output import write_result
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+from dftfs.cli.output import prepared, write_result
+from dftfs.files import refuse_existing, to_json, write_text
 from rsea_core.identify.friction.compare import FrictionComparison, FrictionFit, compare_friction
 from rsea_core.recordings.case import read_case
 
@@ -19,7 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare the laws, print the table, write it with its page."""
     if arguments.out is not None:
-        paths = [prepare_folder(arguments.out) / name for name in ("friction.json", "report.html")]
+        paths = [
+            prepared(arguments, arguments.out) / name for name in ("friction.json", "report.html")
+        ]
         refuse_existing(paths, force=arguments.force)
     case = read_case(arguments.case)
     found = compare_friction(case)

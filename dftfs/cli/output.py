@@ -27,8 +27,19 @@ def output_folder(arguments: argparse.Namespace, name: str) -> Path | None:
             return None
         folder = default_folder(arguments, name)
         progress()(f"files go to {folder} (--out chooses another folder)")
+    return prepared(arguments, folder)
+
+
+def prepared(arguments: argparse.Namespace, folder: Path) -> Path:
+    """A folder that files can be written into; a command that fails removes one that it made.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be made or written to.
+    """
     if not folder.exists():
-        arguments.made_folder = folder  # a command that fails removes it if it is empty
+        arguments.made_folder = folder
     return prepare_folder(folder)
 
 

@@ -4,9 +4,9 @@ import argparse
 from pathlib import Path
 
 from dftfs.cli.common import emit
-from dftfs.cli.output import add_pdf, print_page
+from dftfs.cli.output import add_pdf, prepared, print_page
 from dftfs.errors import DftfsError
-from dftfs.files import prepare_folder, write_text
+from dftfs.files import write_text
 from dftfs.report.page_data import SUFFIX, draw_again
 
 
@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
             f"{folder}: has no data of a page (*{SUFFIX}); study, simulate, compare, diagnose,"
             " import and doctor write them beside their pages"
         )
-    out = folder if arguments.out is None else prepare_folder(arguments.out)
+    out = folder if arguments.out is None else prepared(arguments, arguments.out)
     pages = [draw_again(path, out) for path in found]
     written = [write_text(out / name, text) for name, text in pages]
     written += [pdf for page in written for pdf in print_page(arguments, page)]

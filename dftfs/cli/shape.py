@@ -3,9 +3,9 @@
 import argparse
 
 from dftfs.cli.common import add_design, add_output, emit, progress, read_design, table
-from dftfs.cli.output import default_folder, write_result
+from dftfs.cli.output import default_folder, prepared, write_result
 from dftfs.errors import DesignError
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
+from dftfs.files import refuse_existing, to_json, write_bytes, write_text
 
 _FILES = ("shape.toml", "uniform.toml", "shape.json", "shape.png", "report.html")
 
@@ -36,7 +36,7 @@ def run(arguments: argparse.Namespace) -> int:
     found = compared(
         design, process, rounds=arguments.rounds, elements=not arguments.no_fe, on_progress=say
     )
-    prepare_folder(folder)
+    prepared(arguments, folder)
     write_text(folder / "shape.toml", design_toml(found.shaped))
     write_text(folder / "uniform.toml", design_toml(found.uniform))
     write_text(folder / "shape.json", to_json(found))

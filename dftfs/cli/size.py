@@ -13,9 +13,9 @@ from dftfs.analysis.sizing.relaxation import Relaxation, relaxations
 from dftfs.analysis.sizing.search import Sizing, size
 from dftfs.analysis.sizing.task import SizingTask, built_in_tasks, load_task
 from dftfs.cli.common import add_changes, add_output, add_work, changes, emit, progress
-from dftfs.cli.output import default_folder, write_result
+from dftfs.cli.output import default_folder, prepared, write_result
 from dftfs.cli.size_text import text_of, unmet_text
-from dftfs.files import prepare_folder, refuse_existing, to_json, write_bytes, write_text
+from dftfs.files import refuse_existing, to_json, write_bytes, write_text
 
 _SHOWN = 8
 
@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = arguments.out or default_folder(arguments, f"size-{task.name}")
     paths = {name: folder / name for name in ("best.toml", "size.json", "front.png", "report.html")}
     refuse_existing(list(paths.values()), force=arguments.force)
-    prepare_folder(folder)
+    prepared(arguments, folder)
     with judge_pool(task, arguments.jobs) as judge:
         found = size(task, seed=arguments.seed, judge=judge, on_progress=say)
         if not isinstance(found, Sizing):

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dftfs.cli.common import add_author, add_design, add_output, emit, progress, read_design
-from dftfs.cli.output import add_pdf, default_folder, print_page
+from dftfs.cli.output import add_pdf, default_folder, prepared, print_page
 from dftfs.cli.spring_options import (
     add_friction,
     add_inertia,
@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run every stage, write the report; exit status 1 if a stated requirement fails."""
     from dftfs.analysis.study.run import StudyOptions, run_study
     from dftfs.analysis.torsion.curve_file import curve_csv
-    from dftfs.files import prepare_folder, refuse_existing, to_json, write_text
+    from dftfs.files import refuse_existing, to_json, write_text
     from dftfs.report.study.render import write_report
     from rsea_core.scenarios.scenario import Scenario
 
@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     mesh = mesh_of(arguments, design)
     default = resources.files("dftfs") / "examples" / "torque-1hz.toml"
     scenario = Scenario.from_toml(arguments.scenario or Path(str(default)))
-    folder = prepare_folder(arguments.out or default_folder(arguments, f"study-{design.name}"))
+    folder = prepared(arguments, arguments.out or default_folder(arguments, f"study-{design.name}"))
     report, record, curve = (folder / n for n in ("report.html", "study.json", "curve.csv"))
     refuse_existing([report, record, curve], force=arguments.force)
     study = run_study(

@@ -14,9 +14,9 @@ from dftfs.analysis.sweep.run import SweepResult, run_sweep
 from dftfs.analysis.sweep.table import csv_text, has_parquet, parquet_bytes
 from dftfs.analysis.torsion.batch_solve import MODELS
 from dftfs.cli.common import add_design, add_output, add_work, changes, emit, progress, table
-from dftfs.cli.output import write_result
+from dftfs.cli.output import prepared, write_result
 from dftfs.errors import DesignError
-from dftfs.files import prepare_folder, refuse_existing, write_bytes, write_text
+from dftfs.files import refuse_existing, write_bytes, write_text
 
 _FORMATS = ("step", "stl", "dxf")
 _SHOWN = {
@@ -95,7 +95,7 @@ def _paths(arguments: argparse.Namespace) -> dict[str, Path]:
     kinds = ("csv", *(("parquet",) if has_parquet() else ()), "png", "html")
     paths = {kind: folder / f"sweep.{kind}" for kind in kinds}
     refuse_existing(list(paths.values()), force=arguments.force)
-    prepare_folder(folder)
+    prepared(arguments, folder)
     return paths
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from dftfs.analysis.jobs.store import user_store
 from dftfs.analysis.torsion.batch_solve import MODELS
 from dftfs.cli.common import add_output, emit, progress, table
-from dftfs.cli.output import write_result
-from dftfs.files import prepare_folder, refuse_existing, write_bytes, write_text
+from dftfs.cli.output import prepared, write_result
+from dftfs.files import refuse_existing, write_bytes, write_text
 from dftfs.thesis.figures import figure_list, thesis_figures
 from dftfs.thesis.reproduction import Row, markdown, number, reproduce, summary
 from rsea_core.control.fuzzy.thesis_rules import torque_table
@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.write is not None:
         refuse_existing([arguments.write], force=arguments.force)
     if arguments.figures is not None:
-        refuse_existing([prepare_folder(arguments.figures) / LIST], force=arguments.force)
+        refuse_existing([prepared(arguments, arguments.figures) / LIST], force=arguments.force)
     say, rows = progress(), ()
     if arguments.only != "control":
         say(f"springs by the {arguments.model} model")

@@ -76,7 +76,7 @@ def diagnose(
     if is_bench(case):
         found = diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
         if not quick and _leaves_much(found):
-            say("the laws named leave much: a second opinion by windows")
+            say("the laws found leave much unexplained: a second opinion by windows")
             other = diagnose_windows(case, say=say)
             return other if other.conclusion.found.complete else found
         if quick or not case.validation or found.document["verdict"] != "unexplained":

@@ -48,9 +48,10 @@ def investigate(
     if not quick:
         found, nearly = with_whole_runs(found, say)
         missed = unpredicted_recordings(found) if found.sound and not found.complete else []
-        if missed:
-            case, shared = with_shared_recordings(recorded, missed)
-            say(f"{', '.join(missed)}: parameters that suffice for the others do not predict it")
+        other, more = with_shared_recordings(recorded, missed)
+        if more.keys() - shared.keys():  # of those long enough to be shared
+            case, shared = other, more
+            say(f"not predicted, searched again with two thirds of them: {', '.join(missed)}")
             found, nearly = with_whole_runs(begun(case, None, say), say)
         if nearly is not None and nearly.explained > NEEDS_NO_WINDOWS:
             found = nearly

@@ -11,8 +11,8 @@ from rsea_core.identify.candidates.rig_parameters import Nominal
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.covariance import (
     Spread,
-    jackknife_of_moving,
-    known_before,
+    inverse_prior_std,
+    jackknife_of_identifiable,
     no_wider,
 )
 from rsea_core.identify.law_search.found import Step
@@ -26,10 +26,15 @@ from rsea_core.identify.multistep.criteria import (
     UNKNOWN_SHARE,
     WITHIN_ROW,
 )
-from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
+from rsea_core.identify.multistep.estimator import (
+    Estimate,
+    Estimator,
+    normal_equations,
+    stretches_of,
+)
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
-from rsea_core.identify.multistep.kalman_filter import huber_squares, huber_weights
+from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.machine.inputs import POSITION_COMMAND
 
 DAMPING, INDUCTANCE = "viscous_Nms_per_rad", "terminal_inductance_H"
@@ -78,26 +83,21 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
     """
     level, columns = estimator.jacobian(fit.hypothesis, fit.x)
     _, weight = estimator.problem.prior(fit.hypothesis)
-    n = fit.x.size
     prior = np.diag(weight**2)
-    pieces, gradients, apart = [], [], []
+    stretches, recordings = [], []
     for block, e, J in zip(stretches_of(estimator.tracks), level, columns, strict=True):
-        w = huber_weights(e)
-        for own in (block == b for b in range(block[-1] + 1)):
-            part = J[:, own].reshape(n, -1)
-            pieces.append((part * w[own].ravel()) @ part.T)
-            gradients.append(part @ (w * e)[own].ravel())
-        count = block[-1] + 1
-        apart.append((sum(pieces[-count:]), sum(gradients[-count:])))
-    inverse = np.linalg.inv(sum(pieces) + prior + 1e-9 * np.eye(n))
-    middle = prior + sum(np.outer(g, g) for g in gradients)
+        parts = (block == b for b in range(block[-1] + 1))
+        stretches += [normal_equations([e[own]], [J[:, own]]) for own in parts]
+        recordings.append(normal_equations([e], [J]))
+    inverse = np.linalg.inv(sum(A for A, _ in recordings) + prior + 1e-9 * np.eye(fit.x.size))
+    middle = prior + sum(np.outer(g, g) for _, g in stretches)
     white = inverse * max(float(np.mean([np.mean(huber_squares(e)) for e in level])), 1.0)
-    hessians, of_each = zip(*apart, strict=True)
-    sources = (
-        white, inverse @ middle @ inverse, jackknife_of_moving(pieces, gradients, prior),
-        jackknife_of_moving(hessians, of_each, prior),
-    )  # fmt: skip
-    known = known_before(white, weight)
+    apart = [
+        jackknife_of_identifiable(*zip(*parts, strict=True), prior)
+        for parts in (stretches, recordings)
+    ]
+    known = inverse_prior_std(white, weight)
+    sources = (white, inverse @ middle @ inverse, *apart)
     return Spread(sources=tuple(no_wider(C, known) for C in sources))
 
 

@@ -108,8 +108,8 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     # a fit has taken part of the scatter away; never less than white innovations of that MSNI
     white = inverse * max(tempering * float(fit.msni.mean()), 1.0)
     sandwich = inverse @ (middle + prior) @ inverse
-    apart = jackknife_of_moving(hessians, bench_gradients, prior)
-    known = known_before(white, weight)
+    apart = jackknife_of_identifiable(hessians, bench_gradients, prior)
+    known = inverse_prior_std(white, weight)
     # what the innovations cannot show joins each source: it is the same in every block
     gain = tempering * inverse
     counts = [gain @ g for g in pulls_of(found, counts_of(problem, fit))]
@@ -151,7 +151,7 @@ def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDA
     return [H[:, i] * sizes[i] for H in pieces for i in acting]
 
 
-def known_before(white: NDArray, weight: NDArray) -> NDArray:
+def inverse_prior_std(white: NDArray, weight: NDArray) -> NDArray:
     """Inverse deviations (n,) of the priors; of values without one, by `NO_PRIOR`.
 
     Parameters
@@ -175,7 +175,7 @@ def no_wider(covariance: NDArray, weight: NDArray) -> NDArray:
     return clipped / np.outer(weight, weight)
 
 
-def _lost_without_one(hessians: Sequence[NDArray], prior: NDArray) -> NDArray:
+def _variance_growth(hessians: Sequence[NDArray], prior: NDArray) -> NDArray:
     """By how much the variance of each unknown grows (n,) without the recording it needs most."""
     own = _variances(sum(hessians) + prior + 1e-9 * np.eye(len(prior)))
     return np.max([_variances(H) for H in _without_each(hessians, prior)], axis=0) / own
@@ -224,20 +224,20 @@ def jackknife(
     return (count - 1) / count * moves.T @ moves
 
 
-def jackknife_of_moving(
+def jackknife_of_identifiable(
     hessians: Sequence[NDArray], gradients: Sequence[NDArray], prior: NDArray
 ) -> NDArray:
-    """`jackknife` of the values that no single recording, or piece of one, determines.
+    """`jackknife` of the values that stay identifiable without any one recording, or piece of one.
 
-    A value that one of them alone informs runs off without it: it is held there (zero), and other
-    sources say how far it moves.
+    The variance of the others is zero here: without the recording that determines it a value may
+    move anywhere, and other sources state how well it is known.
     """
-    moving = _lost_without_one(hessians, prior) <= ALONE
+    use = _variance_growth(hessians, prior) <= ALONE
     found = np.zeros(prior.shape)
-    if moving.any():
-        square = np.ix_(moving, moving)
+    if use.any():
+        square = np.ix_(use, use)
         found[square] = jackknife(
-            [H[square] for H in hessians], [g[moving] for g in gradients], prior[square]
+            [H[square] for H in hessians], [g[use] for g in gradients], prior[square]
         )
     return found
 

@@ -55,7 +55,7 @@ def with_shared_recordings(
     Parameters
     ----------
     unpredicted : sequence of str
-        Files of further recordings held out, which what explains the others does not predict.
+        Files of recordings held out that values of the other recordings do not predict.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def with_shared_recordings(
         if r.role == "validation" and not r.quasi_static:
             why = _only_there(r.load.kind, kinds)
             if why is None and r.file in unpredicted:
-                why = "it differs from what explains the recordings fitted"
+                why = "values that explain the other recordings do not predict it"
         cut = int(SHARED * r.rows)
         if why is not None and cut >= LEAST_ROWS and r.rows - cut >= LEAST_ROWS:
             recordings += [part_of(r, 0, cut, role="identification"), part_of(r, cut, r.rows)]

@@ -227,13 +227,11 @@ class Estimator:
     def _normal(self, h: Hypothesis, x: NDArray, level, columns) -> tuple[NDArray, NDArray]:
         """Gauss-Newton matrix (n, n) and gradient (n,) of the cost."""
         centre, weight = self.problem.prior(h)
-        A, g = np.diag(weight**2), weight**2 * (x - centre)
-        for e, J in zip(level, columns, strict=True):
-            w = self.tempering * huber_weights(e).ravel()
-            flat = J.reshape(len(J), -1)
-            A = A + (flat * w) @ flat.T
-            g = g + (flat * w) @ e.ravel()
-        return A, g
+        A, g = normal_equations(level, columns)
+        return (
+            np.diag(weight**2) + self.tempering * A,
+            weight**2 * (x - centre) + self.tempering * g,
+        )
 
     def _best_step(
         self, h: Hypothesis, x: NDArray, cost: float, A: NDArray, g: NDArray, damping: float,
@@ -252,6 +250,25 @@ class Estimator:
                 return step, max(damping * (0.1, 3.0, 100.0)[best], 1e-8)
             damping = damping * 1e4 if fresh else damping
         return None, damping
+
+
+def normal_equations(
+    level: Sequence[NDArray], columns: Sequence[NDArray]
+) -> tuple[NDArray, NDArray]:
+    """Gauss-Newton matrix (u, u) and gradient (u,) of half the robust squares of innovations.
+
+    Parameters
+    ----------
+    level, columns : sequences of (n, p) and (u, n, p) arrays
+        Innovations and their derivatives, of each recording or piece of one.
+    """
+    A, g = 0.0, 0.0
+    for e, J in zip(level, columns, strict=True):
+        flat = J.reshape(len(J), -1)
+        weighted = flat * huber_weights(e).ravel()
+        A = A + weighted @ flat.T
+        g = g + weighted @ e.ravel()
+    return A, g
 
 
 class _Step(NamedTuple):

@@ -80,9 +80,9 @@ class WholeSearch(TakenLaws):
             if not self.taken or best.gain < NEARLY_EXPLAINED * before:
                 continue
             fit = self.to_minimum(best)
-            found = 1.0 - excess(self.own, fit.hypothesis, fit.x) / before
-            say(f"  whole recordings: {best.law.key} explains {found:.2f} of what others leave")
-            if found >= least:
+            explained = 1.0 - excess(self.own, fit.hypothesis, fit.x) / before
+            say(f"  whole recordings: {best.law.key} explains {explained:.2f} of what others leave")
+            if explained >= least:
                 self.take(best, fit, trials, say)
                 return True
         return False
@@ -90,8 +90,8 @@ class WholeSearch(TakenLaws):
     def add_last(self, say, share: float = EXPLAINED) -> bool:
         """Take a small law beside complete ones, which explains a share of what they leave.
 
-        It must predict rows unseen. What it explains, a form of the laws before with more values
-        may have followed: beside it their plainer forms are tried.
+        It must predict rows unseen. Further values of the laws before may have followed the error
+        that it explains: plainer forms of these are tried beside it.
         """
         if self.excess() < LEAST_EXCESS or not 0 < len(self.taken) < WHOLE_LAWS:
             return False

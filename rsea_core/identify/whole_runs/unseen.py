@@ -6,7 +6,6 @@ a law of the machine does, by most of what parameters alone leave there (hold-ou
 Ljung, System Identification (1999), section 16.6).
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -25,12 +24,12 @@ from rsea_core.identify.multistep.criteria import (
     SOUND,
     UNPREDICTED,
 )
-from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.kalman_filter import huber_squares, huber_weights
+from rsea_core.identify.multistep.estimator import Estimate, Estimator, normal_equations
+from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
 
-PREDICTION_STEPS = 3  # Gauss-Newton steps of values within what a fit leaves possible
+PREDICTION_STEPS = 3  # of Gauss and Newton, in a prediction
 
 
 def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, say) -> float:
@@ -77,9 +76,8 @@ def unpredicted_recordings(found: Found) -> list[str]:
     trial = plain.hypothesis, plain.x
     files = []
     for t in recordings_held_out(found, own, trial).tracks:
-        one = own.having([t])
-        cost = predicted_cost(one, own, *trial)
-        if 2.0 * cost > SOUND**2 * t.blocks * len(t.experiment.channels):
+        one, most = own.having([t]), 0.5 * SOUND**2 * t.blocks * len(t.experiment.channels)
+        if _cost(one, *trial) > most and predicted_cost(one, own, *trial) > most:
             files.append(t.experiment.recording.file)
     return files
 
@@ -152,11 +150,11 @@ def _left_unseen(own: Estimator, fit: Estimate) -> float:
 
 
 def predicted_cost(unseen: Estimator, own: Estimator, h: Hypothesis, x: NDArray) -> float:
-    """Cost of recordings held out, by all machines that the fitted ones leave possible.
+    """Least cost of recordings held out, the values within the uncertainty of their fit.
 
-    Nothing pulls an axis back, and over a whole recording an angle errs by far more than its noise
-    if a value errs by its deviation. The values may therefore move as far as the fit does not know
-    them (the posterior predictive likelihood, by Laplace's approximation at its maximum).
+    On an axis without a restoring torque, a value that is wrong by its standard deviation causes an
+    angle error of many times the noise at the end of a recording. The values therefore move, at the
+    cost of their posterior distribution (posterior predictive likelihood, Laplace's approximation).
 
     Parameters
     ----------
@@ -169,31 +167,21 @@ def predicted_cost(unseen: Estimator, own: Estimator, h: Hypothesis, x: NDArray)
     level, columns = own.jacobian(h, x)
     power = max(float(np.mean([np.mean(huber_squares(e)) for e in level])), 1.0)
     _, weight = own.problem.prior(h)
-    known = np.diag(weight**2) + _normal(level, columns)[0] / power
+    precision = np.diag(weight**2) + normal_equations(level, columns)[0] / power
     best, cost = x, _cost(unseen, h, x)
     for _ in range(PREDICTION_STEPS):
-        A, g = _normal(*unseen.jacobian(h, best))
-        step = np.linalg.lstsq(A + known, g + known @ (best - x), rcond=None)[0]
+        A, g = normal_equations(*unseen.jacobian(h, best))
+        step = np.linalg.lstsq(A + precision, g + precision @ (best - x), rcond=None)[0]
         trials = [np.clip(best - share * step, low, high) for share in (1.0, 0.3, 0.1)]
-        moved = [0.5 * float((trial - x) @ known @ (trial - x)) for trial in trials]
-        costs = [_cost(unseen, h, t) + m for t, m in zip(trials, moved, strict=True)]
+        costs = [
+            _cost(unseen, h, trial) + 0.5 * float((trial - x) @ precision @ (trial - x))
+            for trial in trials
+        ]
         least = int(np.argmin(costs))
         if not costs[least] < cost:
             break
         best, cost = trials[least], costs[least]
     return cost
-
-
-def _normal(level: Sequence[NDArray], columns: Sequence[NDArray]) -> tuple[NDArray, NDArray]:
-    """Gauss-Newton matrix (u, u) and gradient (u,) of half the squares of innovations."""
-    n = len(columns[0])
-    A, g = np.zeros((n, n)), np.zeros(n)
-    for e, J in zip(level, columns, strict=True):
-        w = huber_weights(e).ravel()
-        flat = J.reshape(n, -1)
-        A += (flat * w) @ flat.T
-        g += (flat * w) @ e.ravel()
-    return A, g
 
 
 def _cost(own: Estimator, h: Hypothesis, x: NDArray) -> float:

@@ -9,6 +9,7 @@ import dftfs.cli.diagnose as command
 import dftfs.cli.main as program
 from dftfs.cli.diagnose import write_files
 from dftfs.cli.diagnose_routes import Result
+from dftfs.cli.output import prepared
 from dftfs.report.page_data import SUFFIX
 from rsea_core.errors import RseaError
 from rsea_core.files.csv_columns import write_columns
@@ -76,3 +77,21 @@ def test_an_interrupt_inside_a_compiled_loop_is_an_interrupt(monkeypatch, behind
     else:
         assert program.main(["diagnose"]) == 130
         assert "interrupted; nothing half-written" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("there", [False, True])
+def test_a_command_that_is_refused_during_its_work_removes_the_folder_that_it_made(
+    tmp_path, monkeypatch, there
+):
+    folder = tmp_path / "found"
+    if there:
+        folder.mkdir()
+
+    def run(arguments):
+        assert prepared(arguments, folder).is_dir()
+        raise RseaError("rec2.csv: too short")
+
+    known = argparse.Namespace(parse_known_args=lambda given: (argparse.Namespace(run=run), []))
+    monkeypatch.setattr(program, "parser", lambda given: known)
+    assert program.main(["diagnose"]) == 2
+    assert folder.exists() == there

@@ -7,7 +7,7 @@ from rsea_core.identify.judgement.covariance import (
     Spread,
     between_laws,
     jackknife,
-    jackknife_of_moving,
+    jackknife_of_identifiable,
 )
 
 
@@ -48,11 +48,11 @@ def test_a_single_recording_has_no_jackknife():
     assert not jackknife(*_parts(recordings, x), np.eye(2)).any()
 
 
-def test_a_value_that_one_recording_alone_informs_is_held_in_the_jackknife():
+def test_a_value_that_one_recording_alone_determines_has_no_variance_in_the_jackknife():
     recordings = _recordings(np.random.default_rng(2), common=0.5)
     one = [(J * [1.0, b == 0], y) for b, (J, y) in enumerate(recordings)]
     x = _solve(one, 1e-6 * np.eye(2))
-    found = jackknife_of_moving(*_parts(one, x), np.zeros((2, 2)))
+    found = jackknife_of_identifiable(*_parts(one, x), np.zeros((2, 2)))
     assert found[0, 0] > 0.0
     assert not found[1].any()
 

@@ -177,9 +177,7 @@ def test_faint_effect_of_one_recording_waits_for_another(clamped, tmp_path):
     assert decisive_experiment(conclusion).best.separation > DECIDES
 
 
-def test_effect_of_one_recording_that_is_many_standard_errors_ahead_waits_for_none(
-    clamped, tmp_path
-):
+def test_effect_of_one_recording_that_is_many_standard_errors_ahead_is_claimed(clamped, tmp_path):
     friction, _ = chosen(clamped, "gear-friction")
     small = GearFriction(coulomb_Nm=0.4 * friction.starts[0][0])
     one = with_effect(search_of((LOCKED, SLOW), terms=(small,), folder=tmp_path), friction)
