@@ -237,7 +237,7 @@ class WholeSearch(TakenLaws):
                 trials = sorted(found, key=lambda t: -t.gain)
             else:
                 trials = _converged(self, law, trials)
-            best = _plainest(trials, self.doubt())
+            best = plainest(trials, self.doubt())
             if best.law is not law:
                 say(f"  whole recordings: {best.law.key} in place of {law.key}")
             self.fit = best.fit
@@ -296,7 +296,7 @@ def worth(trial: Trial) -> float:
     return trial.gain - RICHER_GAIN * count_values(trial.law)
 
 
-def _plainest(trials: Sequence[Trial], doubt: float) -> Trial:
+def plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
     Every machine has friction: where it explains as much, no dead zone of the drive is named.
