@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.engines.fixed_step.replay import CHANNELS
@@ -18,10 +19,10 @@ from rsea_core.recordings.case import Case
 UNEVEN = 2e-3  # of a row: rms deviation of the stamps below which they are even
 FARTHEST = 0.5  # of a row: a stamp further from its even time belongs to another row
 CURRENT = CHANNELS.index("current_A")
-SPEED_OF = {
-    CHANNELS.index("motor_angle_rad"): CHANNELS.index("motor_velocity_rad_per_s"),
-    CHANNELS.index("load_angle_rad"): CHANNELS.index("load_velocity_rad_per_s"),
-}
+SPEED_OF = tuple(
+    (CHANNELS.index(f"{part}_angle_rad"), CHANNELS.index(f"{part}_velocity_rad_per_s"))
+    for part in ("motor", "load")
+)
 
 
 class RowTimes(StrEnum):
@@ -69,7 +70,6 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
     return [replace(timing, rows=t) for t in rows] + [replace(timing, linear=not timing.linear)]
 
 
-@np.errstate(invalid="ignore", over="ignore")  # runs that leave the range of numbers
 def runs_at(
     runs: NDArray, ahead_s: NDArray, time_s: NDArray, first_rows: Sequence[int],
     winding_time_s: float = 0.0,
@@ -91,31 +91,38 @@ def runs_at(
     n = runs.shape[1]
     begins = np.zeros(n + 1, bool)
     begins[[*first_rows, 0, n]] = True
-    before, after = ~begins[:n], ~begins[1:]  # whether the window has a row before, after
-    step = np.diff(time_s)[None, :, None]
-    slope = np.diff(runs, axis=1) / step  # of the interval after each row but the last
-    right = np.concatenate([slope, slope[:, -1:]], axis=1)
-    left = np.concatenate([slope[:, :1], slope], axis=1)
-    left[:, ~before] = right[:, ~before]
-    right[:, ~after] = left[:, ~after]
-    alone = ~before & ~after
-    right[:, alone] = left[:, alone] = 0.0
-    toward = np.where((ahead_s > 0.0)[None, :, None], right, left)
-    ahead = ahead_s[None, :, None]
-    curved = (before & after)[None, :, None] * (right - left) / np.mean(step)
-    found = runs + 0.5 * ahead * (left + right) + 0.5 * ahead**2 * curved
-    for angle, speed in SPEED_OF.items():
-        found[:, :, angle] = (
-            runs[:, :, angle]
-            + ahead[..., 0] * runs[:, :, speed]
-            + 0.5 * ahead[..., 0] ** 2 * toward[:, :, speed]
-        )
-    row = float(np.mean(step))
+    row = float(np.mean(np.diff(time_s)))
     since = np.where(ahead_s > 0.0, ahead_s, ahead_s + row)  # the command that drives it acts
     share = np.ones_like(since)
     if winding_time_s > 1e-3 * row:
         share = np.expm1(-since / winding_time_s) / np.expm1(-row / winding_time_s)
-    change = row * toward[:, :, CURRENT]
-    begun = runs[:, :, CURRENT] - np.where(ahead_s > 0.0, 0.0, change)
-    found[:, :, CURRENT] = begun + share * change
-    return found
+    return _expanded(np.ascontiguousarray(runs), ahead_s, time_s, begins, share, row)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _expanded(runs, ahead, time, begins, share, row):
+    """Runs (m, n, 7) about their rows; `share` (n,) of its change that a current has made."""
+    m, n, channels = runs.shape
+    out, left, right = np.empty_like(runs), np.empty(channels), np.empty(channels)
+    for t in range(n):
+        before, after = not begins[t], not begins[t + 1]
+        since = 1.0 / (time[t] - time[t - 1]) if before else 0.0
+        until = 1.0 / (time[t + 1] - time[t]) if after else 0.0
+        bend = ahead[t] / row if before and after else 0.0
+        toward = right if ahead[t] > 0.0 else left
+        for i in range(m):
+            for c in range(channels):
+                here = runs[i, t, c]
+                left[c] = (here - runs[i, t - 1, c]) * since if before else 0.0
+                right[c] = (runs[i, t + 1, c] - here) * until if after else left[c]
+                if not before:
+                    left[c] = right[c]
+                curve = bend * (right[c] - left[c])
+                out[i, t, c] = here + 0.5 * ahead[t] * (left[c] + right[c] + curve)
+            for angle, speed in SPEED_OF:
+                mean_speed = runs[i, t, speed] + 0.5 * ahead[t] * toward[speed]
+                out[i, t, angle] = runs[i, t, angle] + ahead[t] * mean_speed
+            change = row * toward[CURRENT]
+            begun = runs[i, t, CURRENT] - (0.0 if ahead[t] > 0.0 else change)
+            out[i, t, CURRENT] = begun + share[t] * change
+    return out
