@@ -80,7 +80,7 @@ class LoadFlexibility(Term):
     )
     outer_fraction: float = parameter(
         unit="-",
-        bounds=(0.01, 0.99),
+        bounds=(0.001, 0.99),
         source="from the mass's place along the link; a fit",
         meaning="Share of the load's inertia that sits beyond the flexibility.",
     )
@@ -132,7 +132,7 @@ class LoadFlexibility(Term):
         unknowns = (
             Unknown(name="frequency_Hz", unit="Hz", low=low / unit, high=120.0 / unit, scale=0.03,
                     log=True),
-            Unknown(name="tip_share", unit="-", low=0.02, high=0.95, scale=0.05),
+            Unknown(name="tip_share", unit="-", low=0.002, high=0.95, scale=0.05),
             Unknown(name="damping_ratio", unit="-", low=1e-3, high=0.5, scale=0.2, log=True,
                     prior=1.0),
         )  # fmt: skip
