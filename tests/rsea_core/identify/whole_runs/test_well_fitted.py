@@ -11,12 +11,15 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.whole_runs.sensor_noise import (
+    begun_at_rig,
     converged,
     in_sensor_noise,
     misfit,
     well_fitted,
 )
 from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig, pendulum_case
+
+FACTOR = 1.2
 
 
 @pytest.fixture(scope="module")
@@ -65,6 +68,34 @@ def test_rows_in_which_unknown_commands_act_do_not_count(tmp_path):
     left = [misfit(own, h, own.fit(h, base.x, iterations=12).x) for own in (all_rows, known)]
     assert left[1] < 1.5
     assert left[0] > 3.0 * left[1]
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory):
+    """An axis whose torques no reading states, in the noise of its encoder."""
+    case = axis_case(tmp_path_factory.mktemp("axis"), axis_recording(seed=2), rig=axis_rig())
+    h = Hypothesis(laws=nuisances(case))
+    estimator, base, _ = parameters_with_timing(case, h, lambda text: None)
+    own = in_sensor_noise(estimator)
+    return own, own.fit(h, base.x, iterations=12)
+
+
+def test_a_fit_along_the_common_factor_of_all_torques_returns_to_the_rig_file(turning):
+    own, best = turning
+    x = best.x.copy()
+    for j, p in enumerate(own.problem.nominals):  # all have the dimension of a torque
+        more = (FACTOR * p.at(x[j]) - p.value) / p.tolerance if p.additive else None
+        x[j] = x[j] + np.log(FACTOR) / p.tolerance if more is None else more
+    far = own.fit(best.hypothesis, x, iterations=0)
+    assert far.likelihood == pytest.approx(best.likelihood, abs=1.0)  # the readings do not tell
+    found = begun_at_rig(own, far)
+    assert found.cost < far.cost
+    assert np.max(np.abs(found.x[: len(own.problem.nominals)])) < 1.0
+
+
+def test_a_fit_that_is_likelier_than_one_from_the_rig_file_stays(turning):
+    own, best = turning
+    assert begun_at_rig(own, best).cost <= best.cost
 
 
 class Stopping:
