@@ -15,11 +15,10 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import COLOUR_GAIN, COLOUR_ROWS, COLOUR_SHARE
 from rsea_core.identify.multistep.estimator import Estimator
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
-from rsea_core.identify.multistep.noise_estimate import changes_within, estimated_noise
+from rsea_core.identify.multistep.noise_estimate import estimated_noise
 from rsea_core.identify.multistep.tracks import Track, prepared
 
 SHORTER = 3.0  # log-likelihood by which a later trial must be better: short time constants first
-FORGOTTEN = 5.0  # time constants after which coloured noise is another
 SMALLER = 0.1  # unknown inputs beside which coloured noise is looked for too
 
 
@@ -40,11 +39,9 @@ def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say)
         if not all(_tells(t, time) for t in estimator.tracks):
             continue
         for share in (1.0, SMALLER):
-            tracks = [
-                _coloured(t, residual, time, share)
-                for t, residual in zip(estimator.tracks, residuals, strict=True)
-            ]
-            own = estimator.having(estimated_noise(tracks, residuals))
+            own = estimator.having(
+                estimated_noise([_coloured(t, time, share) for t in estimator.tracks], residuals)
+            )
             likelihood = _likelihood(own, h, x)
             if likelihood > least + (0.0 if best is estimator else SHORTER):
                 best, least = own, likelihood
@@ -61,14 +58,9 @@ def _tells(t: Track, time_s: float) -> bool:
     return row < time_s < COLOUR_SHARE * t.scale.time_s
 
 
-def _coloured(t: Track, residual: NDArray, time_s: float, share: float) -> Track:
-    """The track with coloured readings, each as large as its white part or as it may be at most."""
-    row_s = t.block * t.experiment.recording.sample_time_s
-    most = changes_within(t.averaged(residual), max(round(FORGOTTEN * time_s / row_s), 1))
-    noise = replace(
-        t.noise, inputs=share * t.noise.inputs, colours=np.minimum(t.noise.readings, most),
-        colour_time_s=time_s, most_colours=most,
-    )  # fmt: skip
+def _coloured(t: Track, time_s: float, share: float) -> Track:
+    inputs = share * t.noise.inputs
+    noise = replace(t.noise, inputs=inputs, colours=t.noise.readings.copy(), colour_time_s=time_s)
     return prepared(t, noise=noise)
 
 

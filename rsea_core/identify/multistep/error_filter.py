@@ -42,15 +42,12 @@ class Noise:
     colours : (p,) array
         Of what each reading errs by over `colour_time_s`, an autoregression of first order; empty
         where readings have white noise.
-    most_colours : (p,) array
-        Upper limits of these.
     """
 
     inputs: NDArray
     readings: NDArray
     colours: NDArray = field(default_factory=lambda: np.zeros(0))
     colour_time_s: float = 0.0
-    most_colours: NDArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def of_readings(self) -> NDArray:

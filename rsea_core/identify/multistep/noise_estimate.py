@@ -53,12 +53,12 @@ def estimated_noise(
         keys += [("colour", c) for c in read]
     noises = [t.noise for t in tracks]
     values = _likelihoods(parts, noises)
-    results = [_descended(parts, keys, steps, values, noises)]
+    results = [_descended(parts, tracks, keys, steps, values, noises)]
     starts = [[_of_fast_changes(p, share) for p in parts] for share in QUIETER]
     likely = [_likelihoods(parts, trial) for trial in starts]
     best = max(range(len(starts)), key=lambda j: sum(likely[j]))
     if sum(likely[best]) > sum(values):
-        results.append(_descended(parts, keys, steps, likely[best], starts[best]))
+        results.append(_descended(parts, tracks, keys, steps, likely[best], starts[best]))
     _, noises = max(results, key=lambda result: result[0])
     return [prepared(t, noise=n) for t, n in zip(tracks, noises, strict=True)]
 
@@ -70,7 +70,6 @@ class _Block:
     track: Track
     rows: slice
     residual: NDArray
-    most: NDArray  # (p,) upper limits of the readings' noise
 
     def likelihood(self, noise: Noise) -> float:
         """Log-likelihood under a noise, robust."""
@@ -94,8 +93,8 @@ class _Block:
 
 
 def _descended(
-    parts: Sequence[_Block], keys: Sequence[tuple], steps: Sequence[float],
-    values: list[float], noises: list[Noise],
+    parts: Sequence[_Block], tracks: Sequence[Track], keys: Sequence[tuple],
+    steps: Sequence[float], values: list[float], noises: list[Noise],
 ) -> tuple[float, list[Noise]]:  # fmt: skip
     """Likelihood and noises after a coordinate search from given noises."""
     for factor in steps:
@@ -103,7 +102,7 @@ def _descended(
             for up in (factor, 1.0 / factor):
                 moved = False
                 for _ in range(12):
-                    trial = [_scaled(p, n, key, up) for p, n in zip(parts, noises, strict=True)]
+                    trial = [_scaled(t, n, key, up) for t, n in zip(tracks, noises, strict=True)]
                     found = _likelihoods(parts, trial)
                     if not sum(found) > sum(values) + 0.1:
                         break
@@ -128,19 +127,8 @@ def _likelihoods(parts: Sequence[_Block], noises: Sequence[Noise]) -> list[float
 def _block(track: Track, residual: NDArray, length: int) -> _Block:
     first = max((track.blocks - length) // 2, 0)
     rows = slice(first, min(first + length, track.blocks))
-    averaged, floor = track.averaged(residual), track.experiment.floor_of_each
-    most = np.maximum(changes_within(averaged, 1), floor / track.block**0.5)
-    left = np.ascontiguousarray(averaged[rows])
-    return _Block(track=track, rows=rows, residual=left, most=most)
-
-
-def changes_within(residual: NDArray, rows: int) -> NDArray:
-    """Standard deviations (p,) of noise in errors (n, p) that is another after some rows.
-
-    White noise is another in each row, coloured noise after a few time constants. Errors that
-    change more slowly, a drift above all, are the model's and are not to pass for such noise.
-    """
-    return np.std(residual[rows:] - residual[:-rows], axis=0) / 2.0**0.5
+    left = np.ascontiguousarray(track.averaged(residual)[rows])
+    return _Block(track=track, rows=rows, residual=left)
 
 
 def _of_fast_changes(part: _Block, share: float) -> Noise:
@@ -155,8 +143,8 @@ def _of_fast_changes(part: _Block, share: float) -> Noise:
     return replace(noise, inputs=inputs, readings=np.maximum(noise.readings, size))
 
 
-def _scaled(part: _Block, noise: Noise, key: tuple, factor: float) -> Noise:
-    track, (kind, at) = part.track, key
+def _scaled(track: Track, noise: Noise, key: tuple, factor: float) -> Noise:
+    kind, at = key
     if kind == "input":
         inputs = noise.inputs.copy()
         inputs[at] *= factor
@@ -169,9 +157,9 @@ def _scaled(part: _Block, noise: Noise, key: tuple, factor: float) -> Noise:
     if kind == "colour":
         colours = noise.colours.copy()
         most = MOST_COLOUR * noise.readings[j] * track.block**0.5
-        colours[j] = min(colours[j] * factor, most, noise.most_colours[j])
+        colours[j] = min(colours[j] * factor, most)
         return replace(noise, colours=colours)
     readings = noise.readings.copy()
     least = 0.5 * track.experiment.floor_of_each[j] / track.block**0.5
-    readings[j] = max(min(readings[j] * factor, part.most[j]), least)
+    readings[j] = max(readings[j] * factor, least)
     return replace(noise, readings=readings)

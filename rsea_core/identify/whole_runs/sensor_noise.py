@@ -29,6 +29,7 @@ from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.tracks import Track, from_rest, prepared
 from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_by_counts, count_of
 
+FORGOTTEN = 5.0  # time constants after which coloured noise is another
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
 STEPS = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
 MOVES = np.concatenate([-STEPS[::-1], [0.0], STEPS])
@@ -46,7 +47,8 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
     ----------
     fit : Estimate or None
         What states how late commands act. A recording that begins in motion does not hold the
-        commands that act in its first rows: these do not count.
+        commands that act in its first rows: these do not count. No noise is larger than what the
+        errors of this fit change by within its time (`changes_within`).
     """
     late_s = 0.0 if fit is None else _delay_s(estimator, fit)
     tracks = []
@@ -59,9 +61,37 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
         inputs, colours = SENSORS_ALONE * noise.inputs, 0.0 * noise.colours
         noise = replace(noise, inputs=inputs, readings=readings, colours=colours)
         tracks.append(prepared(t, noise=noise))
+    if fit is not None:
+        tracks = _in_noise_that_changes(estimator.having(tracks), fit)
     own = estimator.having(tracks)
     own.tempering = 1.0
     return own
+
+
+def _in_noise_that_changes(own: Estimator, fit: Estimate) -> list[Track]:
+    """Tracks whose readings have no more noise than a fit's errors change by within its time.
+
+    Noise that was estimated beside a missing law, a drift above all, holds the errors of the model.
+    """
+    tracks = []
+    for t, r in zip(own.tracks, own.residuals([(fit.hypothesis, fit.x)]), strict=True):
+        row_s = t.block * t.experiment.recording.sample_time_s
+        rows = max(round(FORGOTTEN * t.noise.colour_time_s / row_s), 1) if _of_sensor(t) else 1
+        least = np.maximum(t.experiment.floor_of_each / t.block**0.5, _quantisation(t))
+        most = np.maximum(changes_within(t.averaged(r[0]), rows), least)
+        if np.all(np.isfinite(most)):
+            t = prepared(t, noise=replace(t.noise, readings=np.minimum(t.noise.readings, most)))
+        tracks.append(t)
+    return tracks
+
+
+def changes_within(errors: NDArray, rows: int) -> NDArray:
+    """Standard deviations (p,) of noise in errors (n, p) that is another after some rows.
+
+    White noise is another in each row, coloured noise after a few time constants. Errors that
+    change more slowly are the model's.
+    """
+    return np.std(errors[rows:] - errors[:-rows], axis=0) / 2.0**0.5
 
 
 def _quantisation(t: Track) -> NDArray:

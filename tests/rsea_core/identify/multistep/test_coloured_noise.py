@@ -11,7 +11,6 @@ from rsea_core.identify.multistep.coloured_noise import with_coloured_readings
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters, with_noise
 from rsea_core.identify.multistep.log_nuisances import nuisances
-from rsea_core.identify.multistep.noise_estimate import changes_within, estimated_noise
 from rsea_core.identify.multistep.tracks import prepared
 from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig
 
@@ -56,26 +55,6 @@ def test_coloured_readings_get_their_time_and_size_and_relieve_the_unknown_torqu
 def test_white_readings_stay_white(tmp_path):
     white, h, x = white_estimator(tmp_path, coloured=False)
     assert with_coloured_readings(white, h, x, silent) is white
-
-
-def test_changes_within_some_rows_are_the_size_of_noise_and_leave_out_a_drift():
-    white = np.random.default_rng(7).normal(0.0, SIZE, (20_000, 1))
-    keeps = np.exp(-1.0 / LASTS_rows)
-    coloured = lfilter([np.sqrt(1.0 - keeps**2)], [1.0, -keeps], white, axis=0)
-    drift = np.linspace(0.0, 100.0 * SIZE, len(white))[:, None]
-    assert changes_within(white + drift, 1) == pytest.approx(SIZE, rel=0.03)
-    assert changes_within(coloured + drift, 20) == pytest.approx(SIZE, rel=0.05)
-
-
-def test_a_drift_is_not_taken_for_coloured_noise(tmp_path):
-    white, h, x = white_estimator(tmp_path, coloured=True)
-    (track,) = with_coloured_readings(white, h, x, silent).tracks
-    at = track.experiment.channels.index(ANGLE)
-    residual = white.residuals([(h, x)])[0][0]
-    drift = np.zeros_like(residual)
-    drift[:, at] = np.linspace(0.0, 100.0 * SIZE, len(drift))
-    (found,) = estimated_noise([track], [residual + drift])
-    assert found.noise.of_readings[at] < 1.5 * SIZE
 
 
 def test_a_coloured_reading_keeps_its_variance_from_row_to_row(tmp_path):

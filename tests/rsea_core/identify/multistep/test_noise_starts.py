@@ -46,10 +46,3 @@ def test_noise_begun_at_the_encoders_floor_with_large_torques_ends_at_the_scatte
     read_rad = found.noise.readings[0] * found.block**0.5
     assert read_rad == pytest.approx(SCATTER_rad, rel=0.2)
     assert found.noise.inputs[0] < 0.1 * trapped[0].noise.inputs[0]
-
-
-def test_noise_is_no_larger_than_what_changes_from_row_to_row(scattered):
-    tracks, residuals = scattered
-    ramp = np.linspace(0.0, 50.0 * SCATTER_rad, len(residuals[0]))[:, None]
-    (found,) = estimated_noise(tracks, [residuals[0] + ramp])
-    assert found.noise.readings[0] * found.block**0.5 < 1.2 * SCATTER_rad

@@ -1,12 +1,27 @@
-"""The misfit of whole recordings: the worst reading's errors, and what they cost above noise."""
+"""The misfit of whole recordings: the worst reading's errors, and what they cost above noise.
 
+That noise is the sensor's: what changes more slowly is the model's error.
+"""
+
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.estimator import Estimator
+from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
-from rsea_core.identify.whole_runs.sensor_noise import excess, misfit
+from rsea_core.identify.multistep.tracks import initial_track, prepared
+from rsea_core.identify.whole_runs.sensor_noise import (
+    changes_within,
+    excess,
+    in_sensor_noise,
+    misfit,
+)
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 
 def machine(*innovations):
@@ -35,3 +50,31 @@ def test_what_noise_alone_leaves_has_no_excess():
     assert excess(machine(0.9 * rows), None, None) == 0.0
     twice = excess(machine(np.full((100, 1), 1.2)), None, None)
     assert twice == pytest.approx(50.0 * (huber_squares(1.2) - 1.0))
+
+
+def test_changes_within_some_rows_are_the_size_of_noise_and_leave_out_a_drift():
+    size, lasts_rows = 4e-3, 4.0
+    white = np.random.default_rng(7).normal(0.0, size, (20_000, 1))
+    keeps = np.exp(-1.0 / lasts_rows)
+    coloured = lfilter([np.sqrt(1.0 - keeps**2)], [1.0, -keeps], white, axis=0)
+    drift = np.linspace(0.0, 100.0 * size, len(white))[:, None]
+    assert changes_within(white + drift, 1) == pytest.approx(size, rel=0.03)
+    assert changes_within(coloured + drift, 20) == pytest.approx(size, rel=0.05)
+
+
+@pytest.mark.parametrize("drift_rad_per_s", [0.0, 0.5])
+def test_noise_that_was_estimated_beside_a_drift_is_no_larger_than_the_sensors(
+    tmp_path, drift_rad_per_s
+):
+    given, size = axis_recording(seed=8), 4e-3
+    errors = np.random.default_rng(9).normal(0.0, size, given.rows)
+    angle = given["motor_angle_rad"] + errors + drift_rad_per_s * given.time_s
+    recording = replace(given, columns={**given.columns, "motor_angle_rad": angle})
+    problem = MultistepProblem(axis_case(tmp_path, recording, rig=axis_rig()))
+    h = Hypothesis()
+    estimator = Estimator(problem, [initial_track(e) for e in problem.fitted])
+    loud = [prepared(t, noise=replace(t.noise, readings=0.0 * t.noise.readings + 0.5))
+            for t in estimator.tracks]  # fmt: skip
+    fit = estimator.fit(h, problem.start(h))
+    (track,) = in_sensor_noise(estimator.having(loud), fit).tracks
+    assert track.noise.readings[0] * track.block**0.5 == pytest.approx(size, rel=0.2)
