@@ -108,7 +108,7 @@ def _expanded(runs, ahead, time, begins, share, row):
         before, after = not begins[t], not begins[t + 1]
         since = 1.0 / (time[t] - time[t - 1]) if before else 0.0
         until = 1.0 / (time[t + 1] - time[t]) if after else 0.0
-        bend = ahead[t] / row if before and after else 0.0
+        curvature = ahead[t] / row if before and after else 0.0
         toward = right if ahead[t] > 0.0 else left
         for i in range(m):
             for c in range(channels):
@@ -117,7 +117,7 @@ def _expanded(runs, ahead, time, begins, share, row):
                 right[c] = (runs[i, t + 1, c] - here) * until if after else left[c]
                 if not before:
                     left[c] = right[c]
-                curve = bend * (right[c] - left[c])
+                curve = curvature * (right[c] - left[c])
                 out[i, t, c] = here + 0.5 * ahead[t] * (left[c] + right[c] + curve)
             for angle, speed in SPEED_OF:
                 mean_speed = runs[i, t, speed] + 0.5 * ahead[t] * toward[speed]

@@ -174,7 +174,7 @@ def converged(own: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
 def begun_at_rig(own: Estimator, fit: Estimate) -> Estimate:
     """A fit, or a likelier one that begins with the rig file's values and the laws as they are.
 
-    Where no reading states a torque, one factor of all torques, inertias and stiffnesses changes
+    Where no reading states a torque, a common scale factor of torques and inertias changes
     the tolerances' cost alone: a fit that has once left the rig file's values goes along such a
     curved valley in steps so small that it seems to have ended.
     """

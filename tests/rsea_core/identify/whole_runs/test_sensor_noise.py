@@ -63,7 +63,7 @@ def test_changes_within_some_rows_are_the_size_of_noise_and_leave_out_a_drift():
 
 
 @pytest.mark.parametrize("drift_rad_per_s", [0.0, 0.5])
-def test_noise_that_was_estimated_beside_a_drift_is_no_larger_than_the_sensors(
+def test_noise_that_was_estimated_without_a_law_of_a_drift_is_no_larger_than_the_sensors(
     tmp_path, drift_rad_per_s
 ):
     given, size = axis_recording(seed=8), 4e-3
