@@ -62,7 +62,7 @@ def investigate(
         if not quick:
             found = confirmed_by_whole_runs(found, nearly, say)
     found.shared = shared
-    best = begun_at_rig(found.estimator, found.best)
+    best = found.best if quick else begun_at_rig(found.estimator, found.best)
     found.continue_from(found.estimator, best)
     _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
     found.best, found.pause_shown = replace(best, x=x), x is not best.x
