@@ -89,7 +89,9 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
             linked=traced_parts(page),
         )
     ]
-    ordered = sorted(page.comparisons, key=lambda c: (c.role != "validation", _improvement(c)))
+    ordered = sorted(
+        page.comparisons, key=lambda c: (c.role != "validation", _improvement(c, page))
+    )
     found += [draw.comparison_figure(c, k) for k, c in enumerate(ordered[:COMPARED])]
     found += [draw.law_figure(law, k) for k, law in enumerate(page.laws)]
     if page.traces:
@@ -122,9 +124,14 @@ def parameter_text(name: str) -> str:
     return _UNIT_ENDING.sub("", name).replace("_", " ")
 
 
-def _improvement(item: Comparison) -> tuple[float, float]:
-    """Ordered so that the channel that improved most leads; without a model the worst one."""
-    left = 1.0 if item.nrmse_after is None else item.nrmse_after / max(item.nrmse_before, 1e-12)
+def _improvement(item: Comparison, page: DiagnosisPage) -> tuple[float, float]:
+    """Ordered so that the channel that improved most leads; without a model the worst one.
+
+    Laws improve on what parameters alone leave.
+    """
+    begun = item.nrmse_parameters_only if page.effects else None
+    begun = item.nrmse_before if begun is None else begun
+    left = 1.0 if item.nrmse_after is None else item.nrmse_after / max(begun, 1e-12)
     return left, -item.nrmse_before
 
 
@@ -133,7 +140,7 @@ def key_figures(page: DiagnosisPage) -> tuple[KeyFigure, ...]:
     found = []
     held = [c for c in page.comparisons if c.role == "validation"] or list(page.comparisons)
     if held:
-        worst = min(held, key=_improvement)
+        worst = min(held, key=lambda item: _improvement(item, page))
         steps = (worst.nrmse_before, worst.nrmse_parameters_only, worst.nrmse_after)
         stages = zip(("before", "parameters only", "after"), steps, strict=True)
         names, values = zip(*((n, v) for n, v in stages if v is not None), strict=True)

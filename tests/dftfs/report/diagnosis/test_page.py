@@ -176,6 +176,20 @@ def test_what_remains_names_its_signal_and_an_unclaimed_name_is_no_confidence():
     assert "Nearest known effect (not claimed)" in labels
 
 
+@pytest.mark.parametrize(("found", "leads"), [(True, "current"), (False, "load angle")])
+def test_the_channel_leads_that_laws_improved_most_and_without_laws_the_rigs_values(found, leads):
+    page = example_page()
+    errors = {"load_angle_rad": (3.0, 1e-3, 1e-3), "current_A": (0.71, 0.42, 0.056)}
+    first = page.comparisons[0]
+    compared = tuple(
+        replace(first, signal=signal, nrmse_before=b, nrmse_parameters_only=p, nrmse_after=a)
+        for signal, (b, p, a) in errors.items()
+    )
+    effects = page.effects if found else ()
+    figure = key_figures(replace(page, comparisons=compared, effects=effects))[0]
+    assert figure.label.startswith(f"Error of the {leads}")
+
+
 def test_a_click_on_a_part_leads_to_its_missing_torque_and_its_effect(html):
     page = example_page()
     parts = traced_parts(page)
