@@ -37,7 +37,8 @@ def _recordings(arguments: argparse.Namespace) -> int:
     from rsea_core.recordings.quality_checks import data_warnings
 
     if arguments.out is not None:
-        refuse_existing([arguments.out / PAGE], force=arguments.force)
+        page = prepared(arguments, arguments.out) / PAGE
+        refuse_existing([page], force=arguments.force)
     case = read_case(arguments.case, progress())
     lines = [line for r in case.recordings for line in health(case.rig, r)]
     notes = [f.sentence() for f in (*case.notes(), *data_warnings(case), *case_slips(case))]
@@ -59,8 +60,8 @@ def _recordings(arguments: argparse.Namespace) -> int:
         rows = [(x.file, x.column, x.measure, x.text) for x in lines]
         states = {True: "noticed", False: "would pass", None: "does not apply"}
         rows += [("forty slips", r.name, states[r.noticed], r.text) for r in results]
-        page = write_page(
-            prepared(arguments, arguments.out) / PAGE, "recordings",
+        write_page(
+            page, "recordings",
             title=f"{case.name}: health of its recordings",
             head=("recording", "column", "measure", "found"), rows=rows,
             notes=list(dict.fromkeys(notes)),

@@ -19,9 +19,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare the laws, print the table, write it with its page."""
     if arguments.out is not None:
-        paths = [
-            prepared(arguments, arguments.out) / name for name in ("friction.json", "report.html")
-        ]
+        folder = prepared(arguments, arguments.out)
+        paths = [folder / name for name in ("friction.json", "report.html")]
         refuse_existing(paths, force=arguments.force)
     case = read_case(arguments.case)
     found = compare_friction(case)

@@ -33,10 +33,10 @@ def run(arguments: argparse.Namespace) -> int:
     design, process, say = read_design(arguments), find_process(arguments.process), progress()
     folder = arguments.out or default_folder(arguments, f"shape-{design.name}")
     refuse_existing([folder / name for name in _FILES], force=arguments.force)
+    prepared(arguments, folder)
     found = compared(
         design, process, rounds=arguments.rounds, elements=not arguments.no_fe, on_progress=say
     )
-    prepared(arguments, folder)
     write_text(folder / "shape.toml", design_toml(found.shaped))
     write_text(folder / "uniform.toml", design_toml(found.uniform))
     write_text(folder / "shape.json", to_json(found))

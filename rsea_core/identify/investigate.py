@@ -25,7 +25,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.horizons import likelier, relative_error, with_better_timing
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
-from rsea_core.identify.whole_runs.sensor_noise import begun_at_rig
+from rsea_core.identify.whole_runs.sensor_noise import refitted_from_rig
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
 from rsea_core.recordings.case import Case
 
@@ -62,8 +62,9 @@ def investigate(
         if not quick:
             found = confirmed_by_whole_runs(found, nearly, say)
     found.shared = shared
-    best = found.best if quick else begun_at_rig(found.estimator, found.best)
-    found.continue_from(found.estimator, best)
+    if not quick:
+        found.continue_from(found.estimator, refitted_from_rig(found.estimator, found.best))
+    best = found.best
     _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
     found.best, found.pause_shown = replace(best, x=x), x is not best.x
     return found

@@ -106,19 +106,19 @@ def _expanded(runs, ahead, time, begins, share, row):
     out, left, right = np.empty_like(runs), np.empty(channels), np.empty(channels)
     for t in range(n):
         before, after = not begins[t], not begins[t + 1]
-        since = 1.0 / (time[t] - time[t - 1]) if before else 0.0
-        until = 1.0 / (time[t + 1] - time[t]) if after else 0.0
-        curvature = ahead[t] / row if before and after else 0.0
+        rate_before = 1.0 / (time[t] - time[t - 1]) if before else 0.0
+        rate_after = 1.0 / (time[t + 1] - time[t]) if after else 0.0
+        fraction = ahead[t] / row if before and after else 0.0
         toward = right if ahead[t] > 0.0 else left
         for i in range(m):
             for c in range(channels):
                 here = runs[i, t, c]
-                left[c] = (here - runs[i, t - 1, c]) * since if before else 0.0
-                right[c] = (runs[i, t + 1, c] - here) * until if after else left[c]
+                left[c] = (here - runs[i, t - 1, c]) * rate_before if before else 0.0
+                right[c] = (runs[i, t + 1, c] - here) * rate_after if after else left[c]
                 if not before:
                     left[c] = right[c]
-                curve = curvature * (right[c] - left[c])
-                out[i, t, c] = here + 0.5 * ahead[t] * (left[c] + right[c] + curve)
+                second_order = fraction * (right[c] - left[c])
+                out[i, t, c] = here + 0.5 * ahead[t] * (left[c] + right[c] + second_order)
             for angle, speed in SPEED_OF:
                 mean_speed = runs[i, t, speed] + 0.5 * ahead[t] * toward[speed]
                 out[i, t, angle] = runs[i, t, angle] + ahead[t] * mean_speed

@@ -29,7 +29,7 @@ from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.tracks import Track, from_rest, prepared
 from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_by_counts, count_of
 
-FORGOTTEN = 5.0  # time constants after which coloured noise is another
+DECORRELATED = 5.0  # time constants after which coloured noise is taken for uncorrelated
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
 STEPS = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
 MOVES = np.concatenate([-STEPS[::-1], [0.0], STEPS])
@@ -47,8 +47,8 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
     ----------
     fit : Estimate or None
         What states how late commands act. A recording that begins in motion does not hold the
-        commands that act in its first rows: these do not count. No noise is larger than what the
-        errors of this fit change by within its time (`changes_within`).
+        commands that act in its first rows: these do not count. The errors of this fit also
+        limit the noise (`std_of_differences`).
     """
     late_s = 0.0 if fit is None else _delay_s(estimator, fit)
     tracks = []
@@ -62,36 +62,37 @@ def in_sensor_noise(estimator: Estimator, fit: Estimate | None = None) -> Estima
         noise = replace(noise, inputs=inputs, readings=readings, colours=colours)
         tracks.append(prepared(t, noise=noise))
     if fit is not None:
-        tracks = _in_noise_that_changes(estimator.having(tracks), fit)
+        tracks = _with_limited_noise(estimator.having(tracks), fit)
     own = estimator.having(tracks)
     own.tempering = 1.0
     return own
 
 
-def _in_noise_that_changes(own: Estimator, fit: Estimate) -> list[Track]:
-    """Tracks whose readings have no more noise than a fit's errors change by within its time.
+def _with_limited_noise(own: Estimator, fit: Estimate) -> list[Track]:
+    """Tracks whose readings have no more noise than differences of a fit's errors show.
 
-    Noise that was estimated beside a missing law, a drift above all, holds the errors of the model.
+    Noise that was estimated without a law that the machine has includes the model's error; a drift
+    can exceed the sensor's noise many times.
     """
     tracks = []
     for t, r in zip(own.tracks, own.residuals([(fit.hypothesis, fit.x)]), strict=True):
         row_s = t.block * t.experiment.recording.sample_time_s
-        rows = max(round(FORGOTTEN * t.noise.colour_time_s / row_s), 1) if _of_sensor(t) else 1
+        lag = max(round(DECORRELATED * t.noise.colour_time_s / row_s), 1) if _of_sensor(t) else 1
         least = np.maximum(t.experiment.floor_of_each / t.block**0.5, _quantisation(t))
-        most = np.maximum(changes_within(t.averaged(r[0]), rows), least)
+        most = np.maximum(std_of_differences(t.averaged(r[0]), lag), least)
         if np.all(np.isfinite(most)):
             t = prepared(t, noise=replace(t.noise, readings=np.minimum(t.noise.readings, most)))
         tracks.append(t)
     return tracks
 
 
-def changes_within(errors: NDArray, rows: int) -> NDArray:
-    """Standard deviations (p,) of noise in errors (n, p) that is another after some rows.
+def std_of_differences(errors: NDArray, lag: int) -> NDArray:
+    """Standard deviations (p,) of the noise in errors (n, p) by differences over some rows.
 
-    White noise is another in each row, coloured noise after a few time constants. Errors that
-    change more slowly are the model's.
+    Noise that is uncorrelated over the lag has this standard deviation (von Neumann et al., Ann.
+    Math. Stat. 12 (1941) 153, at a lag of one row); slower errors of the model cancel.
     """
-    return np.std(errors[rows:] - errors[:-rows], axis=0) / 2.0**0.5
+    return np.std(errors[lag:] - errors[:-lag], axis=0) / 2.0**0.5
 
 
 def _quantisation(t: Track) -> NDArray:
@@ -171,12 +172,12 @@ def converged(own: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
     return fit
 
 
-def begun_at_rig(own: Estimator, fit: Estimate) -> Estimate:
-    """A fit, or a likelier one that begins with the rig file's values and the laws as they are.
+def refitted_from_rig(own: Estimator, fit: Estimate) -> Estimate:
+    """A fit, or a likelier one that starts from the rig file's values with the fit's laws.
 
-    Where no reading states a torque, a common scale factor of torques and inertias changes
-    the tolerances' cost alone: a fit that has once left the rig file's values goes along such a
-    curved valley in steps so small that it seems to have ended.
+    Where no reading states a torque, a common scale factor of torques and inertias changes only the
+    prior's cost. Levenberg-Marquardt converges slowly along such a curved valley, and a fit may
+    stop far from the rig file's values.
     """
     x = fit.x.copy()
     x[: len(own.problem.nominals)] = 0.0
@@ -191,7 +192,7 @@ def well_fitted(own: Estimator, fit: Estimate) -> Estimate:
     The errors of a machine that swings lightly damped have a minimum for each cycle by which the
     simulation is early or late: a fit that is three percent off in frequency stays there.
     """
-    fit = begun_at_rig(own, fit)
+    fit = refitted_from_rig(own, fit)
     h, count = fit.hypothesis, len(own.problem.nominals)
     for _ in range(SCANS):
         moves = np.kron(np.eye(count, fit.x.size), MOVES[:, None])

@@ -197,6 +197,18 @@ BAD = [
 ]
 
 
+def test_shape_and_doctor_refuse_an_output_folder_before_their_work(run, monkeypatch):
+    def work(*_, **__):
+        raise AssertionError("works before its output folder is checked")
+
+    monkeypatch.setattr("dftfs.analysis.shape.compare.compared", work)
+    monkeypatch.setattr("rsea_core.recordings.case.read_case", work)
+    for command in (["shape", "al1"], ["doctor", "case"]):
+        status, _, error = run(*command, "--out", "/proc/nowhere")
+        assert status == 2
+        assert "cannot be written" in error
+
+
 BAD_OF_CAD = [
     (["export", "al1", "--formats", "igs", "--out", "x"], 2, "known are step, stl, dxf"),
     (["export", "al1", "--out", "/proc/nowhere"], 2, "cannot be written"),

@@ -16,10 +16,10 @@ from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.tracks import initial_track, prepared
 from rsea_core.identify.whole_runs.sensor_noise import (
-    changes_within,
     excess,
     in_sensor_noise,
     misfit,
+    std_of_differences,
 )
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -52,18 +52,18 @@ def test_what_noise_alone_leaves_has_no_excess():
     assert twice == pytest.approx(50.0 * (huber_squares(1.2) - 1.0))
 
 
-def test_changes_within_some_rows_are_the_size_of_noise_and_leave_out_a_drift():
+def test_differences_show_the_standard_deviation_of_noise_and_not_a_drift():
     size, lasts_rows = 4e-3, 4.0
     white = np.random.default_rng(7).normal(0.0, size, (20_000, 1))
     keeps = np.exp(-1.0 / lasts_rows)
     coloured = lfilter([np.sqrt(1.0 - keeps**2)], [1.0, -keeps], white, axis=0)
     drift = np.linspace(0.0, 100.0 * size, len(white))[:, None]
-    assert changes_within(white + drift, 1) == pytest.approx(size, rel=0.03)
-    assert changes_within(coloured + drift, 20) == pytest.approx(size, rel=0.05)
+    assert std_of_differences(white + drift, 1) == pytest.approx(size, rel=0.03)
+    assert std_of_differences(coloured + drift, 20) == pytest.approx(size, rel=0.05)
 
 
 @pytest.mark.parametrize("drift_rad_per_s", [0.0, 0.5])
-def test_noise_that_was_estimated_without_a_law_of_a_drift_is_no_larger_than_the_sensors(
+def test_noise_estimated_too_large_is_limited_to_the_sensors_noise_with_and_without_a_drift(
     tmp_path, drift_rad_per_s
 ):
     given, size = axis_recording(seed=8), 4e-3

@@ -11,10 +11,10 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.whole_runs.sensor_noise import (
-    begun_at_rig,
     converged,
     in_sensor_noise,
     misfit,
+    refitted_from_rig,
     well_fitted,
 )
 from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig, pendulum_case
@@ -22,14 +22,18 @@ from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig, pen
 FACTOR = 1.2
 
 
-@pytest.fixture(scope="module")
-def swinging(tmp_path_factory):
-    """A bare pendulum that swings for twenty seconds, in the noise of its encoder."""
-    case = pendulum_case(tmp_path_factory.mktemp("pendulum"), seed=1)
+def fitted_whole(case):
+    """An estimator of whole recordings in the sensors' noise, and its fit of parameters alone."""
     h = Hypothesis(laws=nuisances(case))
     estimator, base, _ = parameters_with_timing(case, h, lambda text: None)
     own = in_sensor_noise(estimator)
     return own, own.fit(h, base.x, iterations=12)
+
+
+@pytest.fixture(scope="module")
+def swinging(tmp_path_factory):
+    """A bare pendulum that swings for twenty seconds, in the noise of its encoder."""
+    return fitted_whole(pendulum_case(tmp_path_factory.mktemp("pendulum"), seed=1))
 
 
 def test_a_fit_whose_swing_is_cycles_early_finds_the_right_one(swinging):
@@ -73,11 +77,8 @@ def test_rows_in_which_unknown_commands_act_do_not_count(tmp_path):
 @pytest.fixture(scope="module")
 def turning(tmp_path_factory):
     """An axis whose torques no reading states, in the noise of its encoder."""
-    case = axis_case(tmp_path_factory.mktemp("axis"), axis_recording(seed=2), rig=axis_rig())
-    h = Hypothesis(laws=nuisances(case))
-    estimator, base, _ = parameters_with_timing(case, h, lambda text: None)
-    own = in_sensor_noise(estimator)
-    return own, own.fit(h, base.x, iterations=12)
+    folder = tmp_path_factory.mktemp("axis")
+    return fitted_whole(axis_case(folder, axis_recording(seed=2), rig=axis_rig()))
 
 
 def test_a_fit_along_the_common_factor_of_all_torques_returns_to_the_rig_file(turning):
@@ -88,14 +89,25 @@ def test_a_fit_along_the_common_factor_of_all_torques_returns_to_the_rig_file(tu
         x[j] = x[j] + np.log(FACTOR) / p.tolerance if more is None else more
     far = own.fit(best.hypothesis, x, iterations=0)
     assert far.likelihood == pytest.approx(best.likelihood, abs=1.0)  # the readings do not tell
-    found = begun_at_rig(own, far)
+    found = refitted_from_rig(own, far)
     assert found.cost < far.cost
     assert np.max(np.abs(found.x[: len(own.problem.nominals)])) < 1.0
 
 
-def test_a_fit_that_is_likelier_than_one_from_the_rig_file_stays(turning):
-    own, best = turning
-    assert begun_at_rig(own, best).cost <= best.cost
+@pytest.mark.parametrize(("cost", "kept"), [(9.0, False), (10.0, True), (11.0, True)])
+def test_a_fit_from_the_rig_file_replaces_another_only_if_it_is_likelier(cost, kept):
+    h = Hypothesis()
+    given = SimpleNamespace(hypothesis=h, x=np.array([3.0, -2.0]), cost=10.0)
+    other = SimpleNamespace(hypothesis=h, x=np.zeros(2), cost=cost)
+    begun = []
+
+    def fit(h, x, *, iterations):
+        begun.append(x)
+        return other
+
+    own = SimpleNamespace(problem=SimpleNamespace(nominals=(None,)), fit=fit)
+    assert refitted_from_rig(own, given) is (given if kept else other)
+    assert list(begun[0]) == [0.0, -2.0]  # the rig file's value, and the law's
 
 
 class Stopping:
