@@ -26,15 +26,11 @@ from rsea_core.identify.multistep.criteria import (
     UNKNOWN_SHARE,
     WITHIN_ROW,
 )
-from rsea_core.identify.multistep.estimator import (
-    Estimate,
-    Estimator,
-    normal_equations,
-    stretches_of,
-)
+from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.identify.multistep.steps import normal_equations
 from rsea_core.machine.inputs import POSITION_COMMAND
 
 DAMPING, INDUCTANCE = "viscous_Nms_per_rad", "terminal_inductance_H"
@@ -81,7 +77,7 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
     jackknife over stretches and over recordings (`judgement.covariance`). No direction is wider
     than its prior.
     """
-    level, columns = estimator.jacobian(fit.hypothesis, fit.x)
+    level, columns = estimator.jacobian(fit.hypothesis, fit.x, fine=True)
     _, weight = estimator.problem.prior(fit.hypothesis)
     prior = np.diag(weight**2)
     stretches, recordings = [], []

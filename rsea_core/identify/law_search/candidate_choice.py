@@ -66,7 +66,8 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
     if found.horizon is None or found.horizon > SHORT:
         short = estimator.having(with_windows(estimator, SHORT))
     chosen = standing_out(screened, estimator.tempering)
-    if not any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws):
+    once = any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws)
+    if not (once or (quick and not first)):  # beside a law only whole recordings tell an event
         chosen += pulses(Projection(without_slow_torque(estimator), base))[:PULSES]
     apart: set[str] = set()
     if short is not None:  # in phase, where a law that is far off still shows

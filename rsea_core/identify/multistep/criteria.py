@@ -94,6 +94,7 @@ START_ERROR = 0.01  # of an angle's spread: a start at rest that smoothing misse
 SHAPE_SHARE = 0.5  # of the excess of parameters alone: least held-out gain of a shape
 COMPLETE_SHARE = 0.08  # or of what parameters alone leave: small things that every machine has
 ALIKE_OF_GAIN = 3e-4  # of the gain in whole recordings: laws that differ by less are alike
+FURTHER_FROM_RIG = 4.5  # units of the prior (three deviations): laws that move values by more
 DOUBT = 0.1  # of what is left above the noise, in units: by so much rivals are not told apart
 LEAST_OF_LEFT = 0.05  # of what laws gained on whole recordings so far: least gain of a further one
 WHOLE_LAWS, WHOLE_TRIED, WHOLE_FORMS = 3, 24, 3  # laws at most, fitted each time, of one effect

@@ -11,14 +11,23 @@ from numpy.typing import NDArray
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, huber_weights
+from rsea_core.identify.multistep.steps import (
+    PROBE,
+    UNDAMPED,
+    Start,
+    correction,
+    curved,
+    damped_step,
+    normal_equations,
+)
 from rsea_core.identify.multistep.tracks import Track, block_rows, initial_track, prepared
 
 STEP = 0.02  # of the unknowns, for differences
 MOST_MOVED = 100.0  # root of the sum of squares by which such a step may move the innovations
-LEAST_STEP = 1e-5  # of the same
+FINE = 1e-3  # of such a step, where a direction that no reading determines matters
+LEAST_STEP = 1e-5  # of the unknowns
 ALIKE = 4.0  # factor within which a step stays: simulations are used again
 MOST_KEPT = 1e8  # bytes of residuals
-LONGEST_STEP = 3.0
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
 ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
@@ -149,12 +158,21 @@ class Estimator:
             total += 0.5 * self.tempering * power
         return np.where(np.isfinite(total), total, np.inf)
 
-    def jacobian(self, h: Hypothesis, x: NDArray) -> tuple[list[NDArray], list[NDArray]]:
+    def jacobian(
+        self, h: Hypothesis, x: NDArray, *, fine: bool = False
+    ) -> tuple[list[NDArray], list[NDArray]]:
         """Innovations (n, p) and their derivatives (u, n, p) of each recording.
 
         Forward differences err by their step. Where readings are so good that this is much of
         their noise, a fit would end beside its optimum: steps are as short as the Jacobian before
-        asks for.
+        asks for. They are not shorter, because stick, slip and play make the cost rough, and a fit
+        would stay in its first dent.
+
+        Parameters
+        ----------
+        fine : bool
+            Much shorter steps, for directions that no reading determines: their curvature is a
+            small difference of large ones, and a step's error passes for curvature.
         """
         _, high = self.problem.bounds(h)
         names = self.problem.names(h)
@@ -162,6 +180,7 @@ class Estimator:
         size = np.minimum(
             STEP * (1.0 + 0.1 * np.abs(x)), [longest.get(name, np.inf) for name in names]
         )
+        size = FINE * size if fine else size
         steps = np.where(x + size > high, -size, size)
         trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
         level, columns = [], []
@@ -177,7 +196,9 @@ class Estimator:
                 longest[name] = step
         return level, columns
 
-    def fit(self, h: Hypothesis, x: NDArray, *, iterations: int = 8) -> Estimate:
+    def fit(
+        self, h: Hypothesis, x: NDArray, *, iterations: int = 8, fine: bool = False
+    ) -> Estimate:
         """Levenberg-Marquardt from x.
 
         Simulations for a Jacobian are most of the work. As long as steps lower the cost as
@@ -188,23 +209,27 @@ class Estimator:
         ----------
         iterations : int
             New Jacobians, at most.
+        fine : bool
+            On to where no step lowers the cost, with fine differences.
         """
         low, high = self.problem.bounds(h)
         x = np.clip(x, low, high)
         cost = self.costs([(h, x)])[0]
         damping, arrived, taken = 1e-3, False, 0
         while taken < iterations and np.isfinite(cost) and not arrived:
-            level, columns = self.jacobian(h, x)
+            level, columns = self.jacobian(h, x, fine=fine)
             taken, corrected = taken + 1, 0
             while True:
                 fresh = corrected == 0
                 A, g = self._normal(h, x, level, columns)
                 step, damping = self._best_step(h, x, cost, A, g, damping, fresh)
+                if fresh:
+                    step = self._along_valley(Start(h, x, cost, A, g), level, columns, step)
                 if step is None:
                     arrived = fresh
                     break
                 moved, fall = step.x - x, cost - step.cost
-                little = fall < max(ENOUGH * abs(cost), NEGLIGIBLE)
+                little = fall < max(0.0 if fine else ENOUGH * abs(cost), NEGLIGIBLE)
                 arrived = fresh and little
                 if fresh and fall < NEGLIGIBLE:  # the next fit begins where a Jacobian is known
                     break
@@ -213,7 +238,7 @@ class Estimator:
                 if little or fall < FORESEEN * foreseen or corrected == CORRECTIONS:
                     break
                 columns = [
-                    J + _correction(J, moved, after - e)
+                    J + correction(J, moved, after - e)
                     for J, e, after in zip(columns, level, step.innovations, strict=True)
                 ]
                 level, corrected = step.innovations, corrected + 1
@@ -241,7 +266,7 @@ class Estimator:
         low, high = self.problem.bounds(h)
         for _attempt in range(3 if fresh else 1):
             factors = (damping, damping * 30.0, damping * 1000.0)[: 3 if fresh else 2]
-            trials = [(h, _step(x, A, g, f, low, high)) for f in factors]
+            trials = [(h, damped_step(x, A, g, f, low, high)) for f in factors]
             found = self.innovations(trials)
             costs = self.costs(trials, found)
             best = int(np.argmin(costs))
@@ -251,24 +276,29 @@ class Estimator:
             damping = damping * 1e4 if fresh else damping
         return None, damping
 
-
-def normal_equations(
-    level: Sequence[NDArray], columns: Sequence[NDArray]
-) -> tuple[NDArray, NDArray]:
-    """Gauss-Newton matrix (u, u) and gradient (u,) of half the robust squares of innovations.
-
-    Parameters
-    ----------
-    level, columns : sequences of (n, p) and (u, n, p) arrays
-        Innovations and their derivatives, of each recording or piece of one.
-    """
-    A, g = 0.0, 0.0
-    for e, J in zip(level, columns, strict=True):
-        flat = J.reshape(len(J), -1)
-        weighted = flat * huber_weights(e).ravel()
-        A = A + weighted @ flat.T
-        g = g + weighted @ e.ravel()
-    return A, g
+    def _along_valley(
+        self, start: Start, level: Sequence[NDArray], columns: Sequence[NDArray],
+        step: "_Step | None",
+    ) -> "_Step | None":  # fmt: skip
+        """A step, or a better one along the curve that an undamped step begins (`curved`)."""
+        h, x, cost, A, g = start
+        bounds = self.problem.bounds(h)
+        v = damped_step(x, A, g, UNDAMPED, *bounds) - x
+        foreseen = -float(g @ v + 0.5 * v @ A @ v)
+        fall = 0.0 if step is None else cost - step.cost
+        if foreseen - fall < max(NEGLIGIBLE, FORESEEN * foreseen):
+            return step
+        probed = [e[0] for e in self.innovations([(h, x + PROBE * v)])]
+        ends = curved(start, v, level, columns, probed, self.tempering)
+        if not ends:
+            return step
+        trials = [(h, np.clip(end, *bounds)) for end in ends]
+        found = self.innovations(trials)
+        costs = self.costs(trials, found)
+        best = int(np.argmin(costs))
+        if not costs[best] < cost - fall:
+            return step
+        return _Step(trials[best][1], float(costs[best]), [e[best] for e in found])
 
 
 class _Step(NamedTuple):
@@ -277,32 +307,6 @@ class _Step(NamedTuple):
     x: NDArray
     cost: float
     innovations: list[NDArray]
-
-
-def _correction(J: NDArray, moved: NDArray, change: NDArray) -> NDArray:
-    """What makes derivatives (u, n, p) agree with how a step (u,) changed innovations (n, p)."""
-    rest = change - np.tensordot(moved, J, axes=1)
-    return moved[:, None, None] * (rest / float(moved @ moved))
-
-
-def _step(x, A, g, damping, low, high) -> NDArray:
-    """A damped Gauss-Newton step within bounds: what a bound stops is left out."""
-    use = np.ones(x.size, bool)
-    trial = x
-    for _ in range(3):
-        B = A[np.ix_(use, use)]
-        B = B + damping * np.diag(np.diag(B)) + 1e-9 * np.eye(len(B))
-        d = -np.linalg.solve(B, g[use])
-        largest = np.max(np.abs(d) / (LONGEST_STEP + np.abs(x[use])), initial=0.0)
-        if largest > 1.0:
-            d /= largest
-        trial = x.copy()
-        trial[use] += d
-        stuck = use & (((trial < low) & (x <= low)) | ((trial > high) & (x >= high)))
-        if not np.any(stuck):
-            break
-        use &= ~stuck
-    return np.clip(trial, low, high)
 
 
 def independent_share(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:

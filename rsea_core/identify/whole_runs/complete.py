@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_core.effects.sensor_delay import SensorDelay
-from rsea_core.identify.law_search.candidate_fits import count_values
+from rsea_core.identify.law_search.candidate_fits import count_values, far_from_rig
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.search import begun, laws_of
@@ -282,6 +282,8 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     if not found.steps:
         return _with_shape(found, own, say)
     say(f"whole recordings: what windows showed leaves {left:.2f}")
+    if far_from_rig(found.problem, found.best.x):
+        found, fit, left = _closer_to_rig(found, own, fit, say)
     enough = _enough(found.left_by_parameters)
     if left <= enough:
         found, fit = _without_redundant(found, own, fit, enough, say)
@@ -294,6 +296,37 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         return found
     own, fit = _in_own_share(own, fit)
     return replace(found, complete=True, estimator=own, best=fit, horizon=None)
+
+
+def _closer_to_rig(
+    found: Found, own: Estimator, fit: Estimate, say
+) -> tuple[Found, Estimate, float]:
+    """The laws of windows with values that whole recordings find from the rig file's, if better.
+
+    In windows an unknown torque makes up for values that are far off, as of a delay that
+    parameters alone took the place of.
+
+    Returns
+    -------
+    Found
+    Estimate
+        Of whole recordings.
+    float
+        Its misfit.
+    """
+    h = fit.hypothesis
+    count = len(h.laws) - len(found.steps)
+    starts = [law.starts[0] for law in h.laws[:count]]
+    x = own.problem.start(h, starts)
+    laws = sum(map(count_values, h.laws[count:]))
+    x[x.size - laws :] = fit.x[x.size - laws :]
+    left, other = misfit(own, h, fit.x), converged(own, h, x)
+    left_from_rig = misfit(own, h, other.x)
+    if far_from_rig(own.problem, other.x) or not left_from_rig < LEFT_OF_EACH * left:
+        return found, fit, left
+    say(f"whole recordings: the same laws from the rig file's values leave {left_from_rig:.2f}")
+    own, best = _in_own_share(own, other)
+    return replace(found, estimator=own, best=best, horizon=None), other, left_from_rig
 
 
 def _with_shape(found: Found, own: Estimator, say) -> Found:

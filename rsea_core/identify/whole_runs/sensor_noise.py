@@ -164,9 +164,9 @@ def converged(own: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
     Damping that was once increased keeps steps short, so that a fit stops early where the cost is
     flat.
     """
-    fit = own.fit(h, x, iterations=CONVERGED)
+    fit = own.fit(h, x, iterations=CONVERGED, fine=True)
     for _ in range(SCANS):
-        before, fit = fit, own.fit(h, fit.x, iterations=CONVERGED)
+        before, fit = fit, own.fit(h, fit.x, iterations=CONVERGED, fine=True)
         if before.cost - fit.cost < max(LEAST_GAIN, NEGLIGIBLE_FALL * abs(fit.cost)):
             break
     return fit
@@ -181,7 +181,7 @@ def refitted_from_rig(own: Estimator, fit: Estimate) -> Estimate:
     """
     x = fit.x.copy()
     x[: len(own.problem.nominals)] = 0.0
-    other = own.fit(fit.hypothesis, x, iterations=CONVERGED)
+    other = own.fit(fit.hypothesis, x, iterations=CONVERGED, fine=True)
     stopped = any(at_bound(own.problem, other, law) for law in fit.hypothesis.laws)
     return fit if stopped or not other.cost < fit.cost else other
 

@@ -24,8 +24,9 @@ from rsea_core.identify.multistep.criteria import (
     SOUND,
     UNPREDICTED,
 )
-from rsea_core.identify.multistep.estimator import Estimate, Estimator, normal_equations
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.identify.multistep.steps import normal_equations
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
 

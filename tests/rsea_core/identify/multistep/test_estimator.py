@@ -30,7 +30,7 @@ def fitted(case, off: float = 0.0):
     x[: len(problem.nominals)] += off
     taken = []
     jacobian = estimator.jacobian
-    estimator.jacobian = lambda *given: taken.append(1) or jacobian(*given)
+    estimator.jacobian = lambda *given, **how: taken.append(1) or jacobian(*given, **how)
     return estimator, estimator.fit(h, x, iterations=30), len(taken)
 
 
@@ -57,7 +57,7 @@ def test_a_fit_that_begins_where_another_ended_simulates_no_jacobian_again(case)
     made = problem.trial_machine
     problem.trial_machine = lambda *given: machines.append(1) or made(*given)
     estimator.fit(fit.hypothesis, fit.x, iterations=1)
-    assert len(machines) <= 3  # damped steps alone
+    assert len(machines) <= 8  # steps alone, damped and curved: fewer than its unknowns
 
 
 def test_steps_are_shortened_until_no_innovation_shows_them(tmp_path):

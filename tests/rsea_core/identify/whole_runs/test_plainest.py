@@ -54,3 +54,8 @@ def test_friction_comes_before_a_dead_zone_of_the_drive():
 def test_of_equally_plain_laws_the_one_nearest_to_the_rig_file_is_taken():
     far, near = trial(LoadFriction, 500.0, prior=9.0), trial(SpringParallel, 499.0, prior=1.0)
     assert plainest([far, near], DOUBT) is near
+
+
+def test_a_move_of_the_rig_values_that_is_nearly_free_does_not_outweigh_the_fit():
+    close, closer = trial(LoadFriction, 500.0, prior=2.0), trial(SpringParallel, 499.0, prior=1.6)
+    assert plainest([closer, close], DOUBT) is close

@@ -101,7 +101,7 @@ def test_a_fit_from_the_rig_file_replaces_another_only_if_it_is_likelier(cost, k
     other = SimpleNamespace(hypothesis=h, x=np.zeros(2), cost=cost)
     begun = []
 
-    def fit(h, x, *, iterations):
+    def fit(h, x, *, iterations, fine):
         begun.append(x)
         return other
 
@@ -117,7 +117,7 @@ class Stopping:
         self.costs = list(1000.0 - np.cumsum([0.0, *falls]))
         self.fits = 0
 
-    def fit(self, h, x, *, iterations):
+    def fit(self, h, x, *, iterations, fine):
         self.fits += 1
         cost = self.costs[min(self.fits - 1, len(self.costs) - 1)]
         return SimpleNamespace(hypothesis=h, x=x, cost=cost)
