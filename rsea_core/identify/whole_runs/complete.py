@@ -301,18 +301,16 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
 def _closer_to_rig(
     found: Found, own: Estimator, fit: Estimate, say
 ) -> tuple[Found, Estimate, float]:
-    """The laws of windows with values that whole recordings find from the rig file's, if better.
+    """The laws of windows with values of whole recordings, if these are nearer to the rig file's.
 
-    In windows an unknown torque makes up for values that are far off, as of a delay that
-    parameters alone took the place of.
+    In windows an unknown torque makes up for values that are far off: parameters alone took the
+    place of a delay, and its fit begins there.
 
     Returns
     -------
     Found
-    Estimate
-        Of whole recordings.
-    float
-        Its misfit.
+    Estimate and float
+        The fit of whole recordings, and its misfit.
     """
     h = fit.hypothesis
     count = len(h.laws) - len(found.steps)
@@ -320,13 +318,13 @@ def _closer_to_rig(
     x = own.problem.start(h, starts)
     laws = sum(map(count_values, h.laws[count:]))
     x[x.size - laws :] = fit.x[x.size - laws :]
-    left, other = misfit(own, h, fit.x), converged(own, h, x)
-    left_from_rig = misfit(own, h, other.x)
-    if far_from_rig(own.problem, other.x) or not left_from_rig < LEFT_OF_EACH * left:
-        return found, fit, left
-    say(f"whole recordings: the same laws from the rig file's values leave {left_from_rig:.2f}")
-    own, best = _in_own_share(own, other)
-    return replace(found, estimator=own, best=best, horizon=None), other, left_from_rig
+    best = min(fit, converged(own, h, x), key=lambda f: f.cost)
+    left, of_windows = misfit(own, h, best.x), misfit(own, h, found.best.x)
+    if far_from_rig(own.problem, best.x) or not left < LEFT_OF_EACH * of_windows:
+        return found, fit, misfit(own, h, fit.x)
+    say(f"whole recordings: the same laws with values nearer to the rig file's leave {left:.2f}")
+    in_own_share, taken = _in_own_share(own, best)
+    return replace(found, estimator=in_own_share, best=taken, horizon=None), best, left
 
 
 def _with_shape(found: Found, own: Estimator, say) -> Found:
