@@ -16,13 +16,17 @@ SPRING, FRICTION = SpringParallel(stiffness_Nm_per_rad=0.01), LoadFriction(coulo
 STIFFNESS = "spring-parallel.stiffness_Nm_per_rad"
 
 
-def spread_with_spring(folder, *recordings):
-    """Intervals of parameters and a parallel spring, fitted to whole recordings of an axis."""
+def spread_with(folder, key, name, *recordings):
+    """Intervals of parameters and a law, fitted to whole recordings of an axis."""
     found, own, plain = searched_axis(folder, *recordings)
-    law = next(law for law in laws_of(found) if law.key == "spring-parallel/linear")
+    law = next(law for law in laws_of(found) if law.key == key)
     fit = fitted(own, plain, screen(own, plain, [law])[0])
     names = own.problem.names(fit.hypothesis)
-    return own, fit, names.index(STIFFNESS), spread_of(own, fit_of(own, fit))
+    return own, fit, names.index(name), spread_of(own, fit_of(own, fit))
+
+
+def spread_with_spring(folder, *recordings):
+    return spread_with(folder, "spring-parallel/linear", STIFFNESS, *recordings)
 
 
 def test_one_recording_gives_finite_intervals_within_the_priors(tmp_path):
@@ -50,3 +54,19 @@ def test_the_interval_of_a_complete_law_holds_the_true_value(tmp_path, seed):
     value = own.problem.values(fit.hypothesis, fit.x)[1][-1]["stiffness_Nm_per_rad"]
     scale = fit.hypothesis.laws[-1].unknowns[0].scale
     assert abs(value - SPRING.stiffness_Nm_per_rad) < 3.0 * spread.std[at] * scale
+
+
+def test_a_common_scale_of_torques_that_no_reading_states_is_as_uncertain_as_its_priors(tmp_path):
+    """Torque constant, inertias, damping and friction may all be larger by the same factor."""
+    friction = LoadFriction(coulomb_Nm=0.06)
+    recordings = [axis_recording(friction, seed=seed) for seed in (1, 2)]
+    own, fit, at, spread = spread_with(
+        tmp_path, "load-friction/coulomb", "load-friction.coulomb_Nm", *recordings
+    )
+    of = {n.key: n for n in own.problem.nominals}
+    motor, load = of["motor_inertia_kgm2"], of["load_inertia_kgm2"]
+    total = motor.value + load.value
+    of_inertia = np.hypot(motor.tolerance * motor.value, load.tolerance * load.value) / total
+    stds = (of["torque_constant_Nm_per_A"].tolerance, of_inertia)
+    of_scale = 1.0 / np.sqrt(sum(1.0 / s**2 for s in stds))
+    assert spread.std[at] / fit.x[at] == pytest.approx(of_scale, rel=0.1)
