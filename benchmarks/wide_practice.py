@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor
-from functools import partial
 from pathlib import Path
 
 from rsea_core.errors import RseaError
@@ -67,17 +66,22 @@ def main() -> int:
     cases = [
         c for c in sorted((given.folder / "cases").iterdir()) if c.name in wanted or not wanted
     ]
+    failed = 0
     with ProcessPoolExecutor(given.jobs) as pool:
-        for line in pool.map(partial(run_case, out=given.out), cases):
-            print(line, flush=True)
+        for c, job in [(c, pool.submit(run_case, c, given.out)) for c in cases]:
+            try:
+                print(job.result(), flush=True)
+            except Exception as error:  # in one case: the others are run
+                print(f"{c.name}: failed: {error!r}", flush=True)
+                failed += 1
     scripts = (given.folder / "score_wide.py", given.folder.parent / "score_wide.py")
     script = next((s for s in scripts if s.exists()), None)
     if script is None:
         print("no score_wide.py in the folder or above it: not scored")
-        return 0
+        return int(failed > 0)
     command = [sys.executable, script, "--set", given.folder, "--results", given.out]
     command += ["--json", given.out / "score.json", "--only", ",".join(c.name for c in cases)]
-    return subprocess.run([str(c) for c in command], check=False).returncode
+    return subprocess.run([str(c) for c in command], check=False).returncode or int(failed > 0)
 
 
 if __name__ == "__main__":

@@ -166,7 +166,7 @@ class Estimator:
         Forward differences err by their step. Where readings are so good that this is much of
         their noise, a fit would end beside its optimum: steps are as short as the Jacobian before
         asks for. They are not shorter, because stick, slip and play make the cost rough, and a fit
-        would stay in its first dent.
+        would stay in its first local minimum.
 
         Parameters
         ----------

@@ -1,4 +1,4 @@
-"""Steps of a least-squares fit: damped ones, and one that bends into a curved valley."""
+"""Steps of a least-squares fit: damped ones, and ones along a curved valley."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -78,7 +78,7 @@ def curved(
 
     Scales of torque and inertia that no reading states are determined by their priors alone. The
     cost has a narrow curved valley along them, in which damped straight steps hardly advance. The
-    second derivative of the innovations along the step bends it into the valley (geodesic
+    second derivative of the innovations along the step gives the valley's curvature (geodesic
     acceleration: Transtrum and Sethna, arXiv:1201.5885, section 4).
 
     Parameters

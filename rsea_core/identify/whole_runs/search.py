@@ -22,7 +22,6 @@ from rsea_core.identify.multistep.criteria import (
     ALIKE_OF_GAIN,
     CLOSE_TO_BEST,
     EXPLAINED,
-    FURTHER_FROM_RIG,
     LEAST_EXCESS,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
@@ -31,6 +30,7 @@ from rsea_core.identify.multistep.criteria import (
     NEEDS_NO_WINDOWS,
     NEGLIGIBLE_INCREASE,
     PER_VALUE,
+    PRIOR_AMONG_ALIKE,
     PULSES,
     QUICK_ITERATIONS,
     RICHER_GAIN,
@@ -73,6 +73,8 @@ class WholeSearch(TakenLaws):
         fit most of such an error where the motion is large: it must explain `NEEDS_NO_WINDOWS`.
         """
         before = self.excess()
+        if before == 0.0:  # one reading errs, and others less than their noise
+            return False
         lasting = [t for t in trials if t.law.effect != LoadDisturbance.effect]
         tried = [(t, share) for t in lasting[:1]]
         if trials and (not lasting or trials[0] is not lasting[0]):
@@ -303,21 +305,18 @@ def plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     Every machine has friction: where it explains as much, no dead zone of the drive is named.
     Encoders have whole counts: where a spring explains as much, no scale factor of an angle is.
     Uneven rows of a log leave an error in proportion to the gain, which further values can fit.
-    Of equally plain laws one that keeps the machine close to its rig file is taken, if another one
-    moves it three deviations further: two encoders that disagree by a factor do not tell which of
-    them is wrong.
+    Of equally plain laws one that keeps the machine close to its rig file is taken unless it gains
+    far less: two encoders that disagree by a factor do not tell which of them is wrong.
     """
     best = max(trials, key=worth)
     doubt = max(doubt, ALIKE_OF_GAIN * best.gain)
     alike = [t for t in trials if worth(t) > worth(best) - doubt]
-    nearest = min(t.fit.prior_cost for t in alike)
     return min(
         alike,
         key=lambda t: (
             t.law.effect == DriveDeadZone.effect,
             t.law.effect == SensorScale.effect and t.law.sensor in ANGLES,
             count_values(t.law),
-            t.fit.prior_cost > nearest + FURTHER_FROM_RIG,
-            -t.gain,
+            PRIOR_AMONG_ALIKE * t.fit.prior_cost - t.gain,
         ),
     )

@@ -40,12 +40,12 @@ def begun(x):
 
 def test_a_curved_step_lowers_the_cost_far_more_than_any_straight_one():
     start, v = begun(AT)
-    probed = [e for e in innovations(AT + PROBE * v)]
+    probed = innovations(AT + PROBE * v)
     ends = curved(start, v, innovations(AT), derivatives(AT), probed, 1.0)
     shares = np.geomspace(1e-4, 1.0, 200)
     straight = start.cost - min(cost(AT + s * v) for s in shares)
-    bent = start.cost - min(cost(x) for x in ends)
-    assert bent > 5.0 * max(straight, 1e-3)
+    by_curve = start.cost - min(cost(x) for x in ends)
+    assert by_curve > 5.0 * max(straight, 1e-3)
 
 
 def test_repeated_curved_steps_reach_the_lowest_point_of_the_valley():

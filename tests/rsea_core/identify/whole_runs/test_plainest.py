@@ -11,7 +11,7 @@ from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.spring_parallel import SpringParallel
-from rsea_core.identify.whole_runs.search import plainest
+from rsea_core.identify.whole_runs.search import WholeSearch, plainest
 from rsea_core.identify.whole_runs.taken_laws import Trial
 
 DOUBT = 8.0
@@ -57,5 +57,14 @@ def test_of_equally_plain_laws_the_one_nearest_to_the_rig_file_is_taken():
 
 
 def test_a_move_of_the_rig_values_that_is_nearly_free_does_not_outweigh_the_fit():
-    close, closer = trial(LoadFriction, 500.0, prior=2.0), trial(SpringParallel, 499.0, prior=1.6)
+    close, closer = (
+        trial(LoadFriction, 2_400_714.0, prior=2.0),
+        trial(SpringParallel, 2_400_000.0, prior=1.6),
+    )
     assert plainest([closer, close], DOUBT) is close
+
+
+def test_no_small_law_is_taken_where_the_errors_cost_no_more_than_noise():
+    """One reading errs by more than its noise, the others by less."""
+    begun = SimpleNamespace(excess=lambda: 0.0, taken=[LoadFriction])
+    assert not WholeSearch.add_small(begun, [trial(SpringParallel, 10.0)], print)
