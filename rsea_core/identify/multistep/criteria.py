@@ -24,6 +24,7 @@ PULSES = 2  # tried, of all recordings
 WIDER, WIDER_TIMES = 6.0, 2  # factor of a size's bounds, and how often, where a fit ends at them
 FORMS = 2  # other forms of an effect that are tried where one ends at a bound
 PULSE_RATIO = 20.0  # of its gain to the scatter of the other stretches
+PULSE_IN_WINDOWS = 2.0  # the same ratio of a pulse that whole recordings show
 ONLY_PULSE = 40.0  # its gain over any other's, from which half that ratio is enough
 PER_VALUE = 2.0  # more for each of its values
 RICHER_GAIN = 5.0  # of a law with more values over the plainer one of its effect

@@ -15,8 +15,13 @@ from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
-from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
-from rsea_core.identify.law_search.pulses import pulses
+from rsea_core.identify.law_search.candidate_fits import (
+    at_bound,
+    count_values,
+    fitted,
+    settled,
+)
+from rsea_core.identify.law_search.pulses import pulse_ratio, pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen, screen_again
 from rsea_core.identify.multistep.criteria import (
     ALIKE_OF_GAIN,
@@ -31,6 +36,7 @@ from rsea_core.identify.multistep.criteria import (
     NEGLIGIBLE_INCREASE,
     PER_VALUE,
     PRIOR_AMONG_ALIKE,
+    PULSE_IN_WINDOWS,
     PULSES,
     QUICK_ITERATIONS,
     RICHER_GAIN,
@@ -248,14 +254,27 @@ class WholeSearch(TakenLaws):
             self.rivals[best.law.key] = trials
 
     def predict(self, say) -> None:
-        """Take out laws that do not predict rows which they were not fitted to."""
+        """Take out laws that do not predict rows which they were not fitted to.
+
+        A torque that acts once predicts none: it must be an event in windows, beside the unknown
+        torque that acts there all the time.
+        """
         for law in tuple(self.taken):
             less = without(self.own, self.fit, law)
             predicts, self.ratios[law.key] = needed(self.own, self.fit, law, less)
+            if predicts and law.only is not None:
+                self.ratios[law.key] = self.ratio_in_windows(less)
+                predicts = self.ratios[law.key] > PULSE_IN_WINDOWS
             if not predicts:
                 say(f"  whole recordings: {law.key} does not predict rows that it has not seen")
                 self.fit = less
                 self.taken.remove(law)
+
+    def ratio_in_windows(self, less: Estimate) -> float:
+        """Gain in windows over a fit without a pulse, over the other stretches' scatter."""
+        own = self.found.base_estimator
+        own, fit = settled(own, own.fit(self.fit.hypothesis, self.fit.x), once=True)
+        return pulse_ratio(own, less, fit)
 
     def complete(self, say) -> bool:
         """Whether the laws leave nothing but noise, and predict rows unseen."""

@@ -31,7 +31,9 @@ def searched(folder, *terms) -> tuple[Found, Found | None]:
 def test_two_laws_that_explain_nearly_all_stand_despite_an_error_of_the_log(tmp_path):
     found, nearly = searched(tmp_path, SPRING, LoadFriction(coulomb_Nm=0.01))
     assert not found.complete
-    assert {step.law.effect for step in nearly.steps} == {"spring-parallel", "load-friction"}
+    spring, friction = sorted((step.law.effect for step in nearly.steps), reverse=True)
+    assert spring == "spring-parallel"
+    assert friction in ("gear-friction", "load-friction")  # one rigid body: the same friction
     assert EXPLAINED_TOGETHER < nearly.explained < 1.0
     left = nearly.estimator.innovations([(nearly.best.hypothesis, nearly.best.x)])
     assert np.sqrt(np.mean(left[0][0] ** 2)) > COMPLETE
