@@ -67,7 +67,7 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
         short = estimator.having(with_windows(estimator, SHORT))
     chosen = standing_out(screened, estimator.tempering)
     once = any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws)
-    if not (once or (quick and not first)):  # beside a law only whole recordings tell an event
+    if not (once or (quick and not first)):  # a second law needs the test by whole recordings
         chosen += pulses(Projection(without_slow_torque(estimator), base))[:PULSES]
     apart: set[str] = set()
     if short is not None:  # in phase, where a law that is far off still shows

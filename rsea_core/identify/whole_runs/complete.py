@@ -303,8 +303,8 @@ def _closer_to_rig(
 ) -> tuple[Found, Estimate, float]:
     """The laws of windows with values of whole recordings, if these are nearer to the rig file's.
 
-    In windows an unknown torque makes up for values that are far off: parameters alone took the
-    place of a delay, and its fit begins there.
+    Parameters alone can take the place of a delay, and its fit begins with their values. In windows
+    an unknown torque compensates for these.
 
     Returns
     -------

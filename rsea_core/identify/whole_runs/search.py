@@ -256,17 +256,18 @@ class WholeSearch(TakenLaws):
     def predict(self, say) -> None:
         """Take out laws that do not predict rows which they were not fitted to.
 
-        A torque that acts once predicts none: it must be an event in windows, beside the unknown
-        torque that acts there all the time.
+        Rows unseen do not tell whether a torque acted once. It must also stand out in windows,
+        where the unknown torque that acts all the time is part of the noise.
         """
         for law in tuple(self.taken):
             less = without(self.own, self.fit, law)
             predicts, self.ratios[law.key] = needed(self.own, self.fit, law, less)
             if predicts and law.only is not None:
-                self.ratios[law.key] = self.ratio_in_windows(less)
-                predicts = self.ratios[law.key] > PULSE_IN_WINDOWS
+                ratio = self.ratios[law.key] = self.ratio_in_windows(less)
+                say(f"  whole recordings: {law.key} has a ratio of {ratio:.1f} in windows")
+                predicts = ratio > PULSE_IN_WINDOWS
             if not predicts:
-                say(f"  whole recordings: {law.key} does not predict rows that it has not seen")
+                say(f"  whole recordings: {law.key} is removed: it is not confirmed")
                 self.fit = less
                 self.taken.remove(law)
 

@@ -1,4 +1,4 @@
-"""A torque that acts once stands if it is an event beside the unknown torque of windows."""
+"""A torque that acts once must stand out in windows, where an unknown torque acts all the time."""
 
 from types import SimpleNamespace
 
@@ -16,8 +16,8 @@ LASTING, PULSE = SimpleNamespace(key="friction", only=None), SimpleNamespace(key
     (PULSE, 2.0 * PULSE_IN_WINDOWS, True),
     (LASTING, 0.0, True),
 ])  # fmt: skip
-def test_only_a_pulse_must_be_an_event_in_windows(monkeypatch, law, ratio, kept):
-    """Rows unseen are predicted as well by each of them: a pulse says nothing there."""
+def test_only_a_pulse_must_stand_out_in_windows(monkeypatch, law, ratio, kept):
+    """Rows unseen do not tell whether a torque acted once."""
     monkeypatch.setattr(search, "without", lambda own, fit, law: SimpleNamespace())
     monkeypatch.setattr(search, "needed", lambda own, fit, law, less: (True, 9.0))
     begun = SimpleNamespace(
