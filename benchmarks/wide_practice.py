@@ -62,10 +62,15 @@ def main() -> int:
     parser.add_argument("--only", default="")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
+    cases = sorted(given.folder.glob("cases/*"))
+    if not cases:
+        parser.error(f"{given.folder} has no cases/CASE: give the folder of a set")
+    if given.jobs < 1:
+        parser.error(f"--jobs must be at least 1, not {given.jobs}")
     wanted = set(filter(None, given.only.split(",")))
-    cases = [
-        c for c in sorted((given.folder / "cases").iterdir()) if c.name in wanted or not wanted
-    ]
+    if unknown := wanted - {c.name for c in cases}:
+        parser.error(f"--only: {min(unknown)} is no case of {given.folder}, as {cases[0].name} is")
+    cases = [c for c in cases if c.name in wanted or not wanted]
     failed = 0
     with ProcessPoolExecutor(given.jobs) as pool:
         for c, job in [(c, pool.submit(run_case, c, given.out)) for c in cases]:
