@@ -79,6 +79,7 @@ STEP_ERROR = 0.2  # deviations of innovations that the engine's step may move, r
 LONG_ROWS = 15000  # of a recording in which one mean command per row is tried
 LOST_IN_NOISE = 0.05  # deviations of innovations that this may change, root mean square
 FIRST_STEPS, SEARCH_STEPS = 25.0, 50.0  # per fastest cycle: as windows grow, in the law search
+STEP_SHARE = 0.25  # of the misfit of whole recordings, that half of an engine's step may change
 LEAST_FINENESS, STEP_ROUNDS = 1.0 / 32.0, 3  # of such a step; looks
 RICHARDSON = 4.0 / 3.0  # error of a step over what half of it changes, second order
 SCANS = 3  # of all values, and values moved in each, where a fit of whole recordings ends

@@ -31,6 +31,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
+from rsea_core.identify.whole_runs.parameters_alone import parameters_alone
 from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect, worth
 from rsea_core.identify.whole_runs.sensor_noise import (
     converged,
@@ -39,7 +40,6 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     in_sensor_noise,
     is_coloured,
     misfit,
-    well_fitted,
 )
 from rsea_core.identify.whole_runs.single_zeros import with_single_zeros
 from rsea_core.identify.whole_runs.taken_laws import Trial
@@ -61,7 +61,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         Where none does: the one law that leaves little more, for where windows show nothing.
     """
     own = in_sensor_noise(found.base_estimator, found.base)
-    plain, left = _parameters_alone(own, found.base)
+    own, plain, left = parameters_alone(own, found.base, say)
     other = with_single_zeros(found, own, plain, say)
     if other is not found:
         return with_whole_runs(other, say, again=again)
@@ -122,16 +122,6 @@ def _finished(
     return (_complete(found, search), None) if complete else None
 
 
-def _parameters_alone(own: Estimator, fit: Estimate) -> tuple[Estimate, float]:
-    """Parameters alone fitted to whole recordings, and their misfit."""
-    plain = own.fit(fit.hypothesis, fit.x, iterations=12)
-    left = misfit(own, plain.hypothesis, plain.x)
-    if left > SOUND:
-        plain = well_fitted(own, plain)
-        left = misfit(own, plain.hypothesis, plain.x)
-    return plain, left
-
-
 def _in_noise_of_best_law(
     found: Found, own: Estimator, plain: Estimate, say
 ) -> tuple[Estimator, Estimate, float]:
@@ -145,7 +135,7 @@ def _in_noise_of_best_law(
     if not trials:
         return own, plain, found.left_by_parameters
     own = in_noise_left_by(own, trials[0].fit)
-    plain, left = _parameters_alone(own, plain)
+    own, plain, left = parameters_alone(own, plain, say)
     say(f"  whole recordings: in the noise left by {trials[0].law.key} parameters leave {left:.2f}")
     return own, plain, left
 
@@ -332,7 +322,7 @@ def _with_shape(found: Found, own: Estimator, say) -> Found:
 
     In windows a slow torque can pass for noise that whole recordings do not have.
     """
-    plain, _ = _parameters_alone(own, found.base)
+    own, plain, _ = parameters_alone(own, found.base, say)
     best = next(iter(shapes(Projection(own, plain))), None)
     had = excess(own, plain.hypothesis, plain.x)
     if best is None or had == 0.0:

@@ -1,0 +1,58 @@
+"""Parameters alone fitted to whole recordings, in engine steps that these do not show.
+
+In windows an engine's error stays small; over a whole recording of a machine that nothing pulls
+back it accumulates, and passes for missing physics where sensors are fine.
+"""
+
+import numpy as np
+
+from rsea_core.identify.multistep.criteria import (
+    LEAST_FINENESS,
+    SOUND,
+    STEP_ERROR,
+    STEP_SHARE,
+)
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.horizons import in_steps
+from rsea_core.identify.whole_runs.sensor_noise import misfit, well_fitted
+
+
+def parameters_alone(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Estimate, float]:
+    """Parameters alone fitted to whole recordings, and their misfit.
+
+    Parameters
+    ----------
+    own : Estimator
+        Of whole recordings (`in_sensor_noise`); the one returned has shorter engine steps where
+        half of a step changes the errors by more than a share of what they are.
+    """
+    own, plain, left = _in_fine_steps(own, own.fit(fit.hypothesis, fit.x, iterations=12), say)
+    if SOUND < left < np.inf:
+        own, plain, left = _in_fine_steps(own, well_fitted(own, plain), say)
+    return own, plain, left
+
+
+def _in_fine_steps(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Estimate, float]:
+    """An estimator in steps that do not cause the misfit, the fit continued, and its misfit."""
+    h, left = fit.hypothesis, misfit(own, fit.hypothesis, fit.x)
+    while SOUND < left < np.inf and own.problem.steps.fineness > LEAST_FINENESS:
+        steps = own.problem.steps
+        finer = in_steps(own, steps._replace(fineness=0.5 * steps.fineness))
+        moved = step_error(own, finer, fit)
+        if moved < max(STEP_ERROR, STEP_SHARE * left):
+            break
+        fit = finer.fit(h, fit.x, iterations=12)
+        own, before, left = finer, left, misfit(finer, h, fit.x)
+        say(
+            f"  whole recordings: half of a step moves errors by {moved:.2g} deviations, parameters"
+            f" leave {left:.2f} in place of {before:.2f}"
+        )
+    return own, fit, left
+
+
+def step_error(own: Estimator, finer: Estimator, fit: Estimate) -> float:
+    """Largest root mean square [noise deviations] by which other steps change a reading's error."""
+    trial = [(fit.hypothesis, fit.x)]
+    pairs = zip(own.innovations(trial), finer.innovations(trial), strict=True)
+    changes = [np.sqrt(np.mean((e[0] - f[0]) ** 2, axis=0)) for e, f in pairs]
+    return float(np.max(changes))
