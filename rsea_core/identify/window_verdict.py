@@ -37,7 +37,11 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.result.conclusion import Conclusion
-from rsea_core.identify.window_confidence import step_confidence, step_presence
+from rsea_core.identify.window_confidence import (
+    exceeds_deviations,
+    step_confidence,
+    step_presence,
+)
 from rsea_core.identify.window_findings import stands
 from rsea_core.identify.window_fit import (
     FoundFit,
@@ -126,7 +130,9 @@ class WindowVerdict(Conclusion):
         if self.refuted or self.unpredicted or self.no_further or any(s is not None for s in seen):
             return "unexplained"
         if self.found.steps:
+            first = len(self.fit.hypothesis.laws) - len(self.found.steps)
             there = step_presence(self.found, 0, self.held_out) >= 0.5
+            there = there and exceeds_deviations(self._figures(first))
             if there or self.delayed is not None:
                 return "missing-physics"
             much = any(_gains_much(step) for step in self.found.steps)
@@ -173,8 +179,8 @@ class WindowVerdict(Conclusion):
         found = []
         first = len(self.fit.hypothesis.laws) - len(self.found.steps)
         for number, step in enumerate(self.found.steps):
-            confidence = self.step_confidence(number)
-            if self.verdict == "unexplained":
+            confidence, figures = self.step_confidence(number), self._figures(first + number)
+            if self.verdict == "unexplained" or not exceeds_deviations(figures):
                 confidence = min(confidence, UNCLAIMED)
             scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
             alike = [w.effect for w, g in rivals_of(step.law, step.rivals) if step.gain - g < scale]
@@ -184,7 +190,7 @@ class WindowVerdict(Conclusion):
                     "subsystem": step.law.subsystem,
                     "confidence": round(confidence, 3),
                     "law": step.law.law,
-                    "parameters": self._figures(first + number),
+                    "parameters": figures,
                     "class": list(dict.fromkeys([step.law.effect, *alike])),
                     "alternatives": [
                         {"name": law.effect, "delta_score": round(step.gain - gain, 2),

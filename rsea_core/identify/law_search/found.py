@@ -8,7 +8,7 @@ from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
-from rsea_core.identify.multistep.criteria import LEAST_EXCESS, LOST, SOUND
+from rsea_core.identify.multistep.criteria import LEAST_EXCESS, LOST, SOUND, UNEVEN_GAIN
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 
@@ -78,6 +78,9 @@ class Found:
         Cost of these errors above that of the noise, in units.
     sound_below : float
         Misfit, in these deviations, below which parameters alone are sufficient.
+    of_whole : Found or None
+        The law that alone explains most of the errors of the whole recordings fitted, complete if
+        windows confirm it.
     complete : bool
         Whether laws stand by whole recordings: they leave nothing but that noise, or little more.
     explained : float
@@ -103,6 +106,7 @@ class Found:
     left_by_parameters: float = np.inf
     excess: float = 0.0
     sound_below: float = SOUND
+    of_whole: "Found | None" = None
     complete: bool = False
     explained: float = 1.0
 
@@ -120,6 +124,14 @@ class Found:
     def acts_once(self) -> bool:
         """Whether all laws are external torques that acted once."""
         return all(step.law.effect == LoadDisturbance.effect for step in self.steps)
+
+    @property
+    def agrees_with_whole(self) -> bool:
+        """Whether windows show one law, by far, and it is that of whole recordings."""
+        if self.of_whole is None or len(self.steps) != 1:
+            return False
+        step = self.steps[0]
+        return step.gain > UNEVEN_GAIN and step.law.key == self.of_whole.steps[0].law.key
 
     @property
     def predicts_longer(self) -> bool:

@@ -42,8 +42,14 @@ def pruned(found, say) -> bool:
 
 
 def without_weak_end(found) -> None:
-    """Take out last laws that convince nobody; the first of them is kept as refused."""
+    """Take out last laws that gain unevenly; the first of them is kept as refused.
+
+    A law alone stays if it also explains most of the errors of whole recordings, which no unknown
+    torque compensates: windows may show a late reading only where a motion begins.
+    """
     while found.steps and found.steps[-1].law.only is None and found.steps[-1].ratio < KEPT_RATIO:
+        if found.agrees_with_whole:
+            break
         own, fit = _without(found, found.steps[-1].law)
         found.estimator, found.best = own, fit
         found.refused, found.steps = found.steps[-1], found.steps[:-1]

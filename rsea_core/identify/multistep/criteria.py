@@ -142,6 +142,7 @@ INDEPENDENT = 0.6  # share of independent innovations below which a law is not a
 LEAST_INDEPENDENT = 0.1  # of that share, for a law that gains evenly is one of the things there
 HIGHEST, UNCLAIMED = 0.97, 0.45  # confidences
 FURTHER = (1.0, 0.9)  # factors of the first and the second law's
+LEAST_DEVIATIONS = 2.0  # of its own, by which a claimed effect's figure differs from zero
 FURTHER_RATIO_AT, FURTHER_RATIO_SCALE = 11.0, 1.0  # gain over its deviation of a further law
 UNKNOWN_SHARE = 0.005  # of the usual torque: a smaller unknown one is not stated
 DELAY_ROWS = 1.5  # a row of the log and half a row of hold; a later command is late in the drive

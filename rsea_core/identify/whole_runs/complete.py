@@ -6,7 +6,8 @@ import numpy as np
 
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.identify.law_search.candidate_fits import count_values, far_from_rig
-from rsea_core.identify.law_search.found import Found, Step
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.hold_out import held_out_in_short_windows
 from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.search import begun, laws_of
 from rsea_core.identify.law_search.shape_search import shapes
@@ -15,24 +16,28 @@ from rsea_core.identify.multistep.criteria import (
     COMPLETE,
     COMPLETE_SHARE,
     EXPLAINED,
-    EXPLAINED_TOGETHER,
     LEAST_EXCESS,
+    LEAST_GAIN,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     NEARLY_EXPLAINED,
-    PER_VALUE,
-    RICHER_GAIN,
     SHAPE_SHARE,
     SOUND,
     SOUND_IN_LEFT_NOISE,
     UNPREDICTED,
     WHOLE_LAWS,
 )
-from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
+from rsea_core.identify.whole_runs.outcome import (
+    complete_by,
+    first_law,
+    in_own_share,
+    nearly_complete,
+)
 from rsea_core.identify.whole_runs.parameters_alone import parameters_alone
-from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect, worth
+from rsea_core.identify.whole_runs.search import WholeSearch
 from rsea_core.identify.whole_runs.sensor_noise import (
     converged,
     excess,
@@ -42,7 +47,6 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     misfit,
 )
 from rsea_core.identify.whole_runs.single_zeros import with_single_zeros
-from rsea_core.identify.whole_runs.taken_laws import Trial
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
 
@@ -90,11 +94,11 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
             return finished
     if found.sound:  # an error that small is not evidence of a law that explains a part of it
         return found, None
-    nearly = _nearly_complete(found, search, say)
+    nearly = nearly_complete(found, search, say)
     other = _with_other_timing(search, say) if again and search.taken else None
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
         return other
-    return found, nearly
+    return (found if nearly else replace(found, of_whole=first_law(found, search))), nearly
 
 
 def _finished(
@@ -104,6 +108,9 @@ def _finished(
 
     None where they do not predict rows unseen.
     """
+    other = _with_timing_for_late_reading(search, say) if again else None
+    if other is not None and other[0].complete:
+        return other
     search.refine(say)
     search.seek_rivals(say)
     search.compare(say)
@@ -119,7 +126,7 @@ def _finished(
     if not (complete or found.sound or of_log):
         # faster recordings held out can show a further law that those fitted hardly do, as drag
         complete = search.add_last(say, NEARLY_EXPLAINED) and search.complete(say)
-    return (_complete(found, search), None) if complete else None
+    return (complete_by(found, search), None) if complete else None
 
 
 def _in_noise_of_best_law(
@@ -149,6 +156,24 @@ def _within_half_a_row(search: WholeSearch) -> bool:
     return any(abs(delay_s) < 0.5 * row_s for delay_s in late)
 
 
+def _with_timing_for_late_reading(search: WholeSearch, say) -> tuple[Found, Found | None] | None:
+    """The search with commands at other times that explain as much as a late reading does.
+
+    A command that is held between rows changes the current at once; one taken for linear makes the
+    current seem early or late.
+    """
+    own, case = search.own, search.own.problem.case
+    for law in [w for w in search.taken if w.kind is SensorDelay]:
+        less = without(own, search.fit, law)
+        for timing in timings(case, own.problem.timing):
+            problem = MultistepProblem(case, timing=timing, steps=own.problem.steps)
+            fit = with_best_delay(with_problem(own, problem), less.hypothesis, less.x)
+            if fit.cost < search.fit.cost + LEAST_GAIN:
+                say(f"searched again: other times of commands explain as much as {law.key}")
+                return with_whole_runs(begun(case, timing, say), say, again=False)
+    return None
+
+
 def _with_other_timing(
     search: WholeSearch, say, least: float = 0.0
 ) -> tuple[Found, Found | None] | None:
@@ -173,82 +198,6 @@ def _with_other_timing(
     return None
 
 
-def _nearly_complete(found: Found, search: WholeSearch, say) -> Found | None:
-    """Laws, or one alone, that explain most of what parameters leave, of rows unseen too."""
-    own, plain = search.own, search.plain
-    excess_before = excess(own, plain.hypothesis, plain.x)
-    if excess_before == 0.0:  # one reading is not predicted, and others better than their noise
-        return None
-    together = _nearly_complete_together(found, search, excess_before, say)
-    if together is not None:
-        return together
-    for trial in _alone(search):
-        if trial.law.only is not None:
-            continue  # a torque that acts once can fit the error of a law that is not known
-        explained = 1.0 - excess(own, trial.fit.hypothesis, trial.fit.x) / excess_before
-        if explained < EXPLAINED:
-            continue
-        predicts, ratio = needed(own, trial.fit, trial.law, plain)
-        unseen = unseen_share(found, own, trial.fit, plain, say) if predicts else np.inf
-        explained = min(explained, 1.0 - unseen)
-        if explained > EXPLAINED:
-            name = trial.law.key
-            say(f"  whole recordings: {name} explains {explained:.2f} of what parameters leave")
-            search.fit, search.taken = trial.fit, [trial.law]
-            search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
-            return replace(_complete(found, search), explained=explained)
-    return None
-
-
-def _nearly_complete_together(
-    found: Found, search: WholeSearch, excess_before: float, say
-) -> Found | None:
-    """All laws taken, if they leave little and each explains most of what the others leave.
-
-    What is left may be an error of the log that no law describes, as of uneven time stamps.
-    """
-    if not _leaves_little(search, excess_before):
-        return None
-    search.refine(say)
-    search.compare(say)
-    search.predict(say)
-    if not _leaves_little(search, excess_before):
-        return None
-    own, left = search.own, search.excess()
-    for law in search.taken:
-        less = without(own, search.fit, law)
-        if left > (1.0 - EXPLAINED) * excess(own, less.hypothesis, less.x):
-            say(f"  whole recordings: {law.key} explains little of what the others leave")
-            return None
-    unseen = unseen_share(found, own, search.fit, search.plain, say)
-    explained = 1.0 - max(left / excess_before, unseen)
-    if explained < EXPLAINED:
-        return None
-    say(f"  whole recordings: together laws explain {explained:.3f} of what parameters leave")
-    return replace(_complete(found, search), explained=explained)
-
-
-def _leaves_little(search: WholeSearch, excess_before: float) -> bool:
-    """Whether several lasting laws leave a small share of what parameters leave."""
-    lasting = all(law.only is None for law in search.taken)
-    several = len(search.taken) > 1
-    return several and lasting and search.excess() < (1.0 - EXPLAINED_TOGETHER) * excess_before
-
-
-def _alone(search: WholeSearch) -> list[Trial]:
-    """Trials of single laws: the one that made all others redundant, then those of the first round.
-
-    A fit that began together with another law can reach a minimum that a direct fit misses.
-    """
-    if len(search.taken) != 1:
-        return search.first
-    law = search.taken[0]
-    mine = next(t for t in search.rivals[law.key] if t.law is law)
-    gain = search.plain.cost - search.fit.cost - PER_VALUE * count_values(law)
-    mine = replace(mine, fit=search.fit, gain=gain, left=search.left())
-    return [mine, *(t for t in search.first if t.law is not law)]
-
-
 def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     """What windows showed, marked as complete if it leaves as little of whole recordings.
 
@@ -271,6 +220,11 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
             return nearly
     if not found.steps:
         return _with_shape(found, own, say)
+    if found.agrees_with_whole:
+        unseen = held_out_in_short_windows(found.of_whole)
+        if unseen is not None and unseen.gain > 0.0:
+            say(f"whole recordings: windows show {found.steps[0].law.key} too")
+            return found.of_whole
     say(f"whole recordings: what windows showed leaves {left:.2f}")
     if far_from_rig(found.problem, found.best.x):
         found, fit, left = _closer_to_rig(found, own, fit, say)
@@ -284,7 +238,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     plain = converged(own, found.base.hypothesis, found.base.x)
     if unseen_share(found, own, fit, plain, say) >= UNPREDICTED:
         return found
-    own, fit = _in_own_share(own, fit)
+    own, fit = in_own_share(own, fit)
     return replace(found, complete=True, estimator=own, best=fit, horizon=None)
 
 
@@ -313,8 +267,8 @@ def _closer_to_rig(
     if far_from_rig(own.problem, best.x) or not left < LEFT_OF_EACH * of_windows:
         return found, fit, misfit(own, h, fit.x)
     say(f"whole recordings: the same laws with values nearer to the rig file's leave {left:.2f}")
-    in_own_share, taken = _in_own_share(own, best)
-    return replace(found, estimator=in_own_share, best=taken, horizon=None), best, left
+    own, taken = in_own_share(own, best)
+    return replace(found, estimator=own, best=taken, horizon=None), best, left
 
 
 def _with_shape(found: Found, own: Estimator, say) -> Found:
@@ -353,33 +307,3 @@ def _enough(left: float) -> float:
     """Misfit below which laws are complete, by what parameters alone leave."""
     most = float(np.sqrt(1.0 + (1.0 - EXPLAINED) * max(left**2 - 1.0, 0.0)))
     return max(min(COMPLETE, most), COMPLETE_SHARE * left)
-
-
-def _in_own_share(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
-    """A fit of whole recordings in its own share of independent innovations."""
-    own = own.having(own.tracks)
-    own.tempering = independent_share(own, fit.hypothesis, fit.x)
-    return own, own.fit(fit.hypothesis, fit.x, iterations=4)
-
-
-def _complete(found: Found, search: WholeSearch) -> Found:
-    """The search's laws as what was found."""
-    own, fit = _in_own_share(search.own, search.fit)
-    steps = []
-    for law in [w for w in fit.hypothesis.laws if any(w is other for other in search.taken)]:
-        alone = len(search.taken) == 1
-        less = search.plain if alone else without(search.own, search.fit, law)
-        gain = less.cost - search.fit.cost - PER_VALUE * count_values(law)
-        trials = best_of_each_effect(search.rivals[law.key])
-        rivals = [t for t in trials if t.law is not law]
-        mine = gain - RICHER_GAIN * count_values(law)
-        mine = next((worth(t) for t in search.rivals[law.key] if t.law is law), mine)
-        steps.append(
-            Step(law=law, screened=gain, gain=gain, ratio=search.ratios[law.key],
-                 tempering=own.tempering, doubt=search.doubt(),
-                 rivals=tuple((t.law, gain + worth(t) - mine) for t in rivals))
-        )  # fmt: skip
-    return replace(
-        found, estimator=own, best=fit, steps=steps, horizon=None, base_shapes=[], shapes=[],
-        refused=None, complete=True,
-    )  # fmt: skip
