@@ -108,8 +108,8 @@ def _finished(
 
     None where they do not predict rows unseen.
     """
-    other = _with_timing_for_late_reading(search, say) if again else None
-    if other is not None and other[0].complete:
+    other = _without_late_reading(search, say, again=again)
+    if other is not None:
         return other
     search.refine(say)
     search.seek_rivals(say)
@@ -121,6 +121,9 @@ def _finished(
         if other is not None and other[0].complete:
             return other
         search.add_last(say)
+        other = _without_late_reading(search, say, again=again)
+        if other is not None:
+            return other
     of_log = found.sound and _within_half_a_row(search)
     complete = not of_log and search.complete(say)
     if not (complete or found.sound or of_log):
@@ -156,21 +159,34 @@ def _within_half_a_row(search: WholeSearch) -> bool:
     return any(abs(delay_s) < 0.5 * row_s for delay_s in late)
 
 
-def _with_timing_for_late_reading(search: WholeSearch, say) -> tuple[Found, Found | None] | None:
-    """The search with commands at other times that explain as much as a late reading does.
+def _without_late_reading(
+    search: WholeSearch, say, *, again: bool
+) -> tuple[Found, Found | None] | None:
+    """Take out late readings that another delay of the commands explains as well.
 
-    A command that is held between rows changes the current at once; one taken for linear makes the
-    current seem early or late.
+    Returns
+    -------
+    tuple or None
+        The search (`with_whole_runs`) with commands at other times that explain as much, if its
+        laws are complete or nearly so. A held command changes the current at once; if it is taken
+        for linear, the current seems early or late.
     """
     own, case = search.own, search.own.problem.case
     for law in [w for w in search.taken if w.kind is SensorDelay]:
         less = without(own, search.fit, law)
-        for timing in timings(case, own.problem.timing):
+        for timing in (own.problem.timing, *timings(case, own.problem.timing)):
             problem = MultistepProblem(case, timing=timing, steps=own.problem.steps)
             fit = with_best_delay(with_problem(own, problem), less.hypothesis, less.x)
-            if fit.cost < search.fit.cost + LEAST_GAIN:
-                say(f"searched again: other times of commands explain as much as {law.key}")
-                return with_whole_runs(begun(case, timing, say), say, again=False)
+            if not fit.cost < search.fit.cost + LEAST_GAIN:
+                continue
+            say(f"  whole recordings: other times of commands explain as much as {law.key}")
+            if timing is own.problem.timing:
+                search.fit, search.taken = fit, [w for w in search.taken if w is not law]
+                break
+            if again:
+                other = with_whole_runs(begun(case, timing, say), say, again=False)
+                if other[0].complete or other[1] is not None:
+                    return other
     return None
 
 

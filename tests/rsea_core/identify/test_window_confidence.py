@@ -6,18 +6,23 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.spring_hardening import SpringHardening
 from rsea_core.identify import window_confidence
 from rsea_core.identify.law_search.hold_out import HeldOut
-from rsea_core.identify.window_confidence import step_confidence, step_presence
+from rsea_core.identify.window_confidence import (
+    exceeds_deviations,
+    step_confidence,
+    step_presence,
+)
 from rsea_core.machine.rig import Rig
 
 
-def law(kind, sensor=None):
-    return SimpleNamespace(effect=kind.effect, sensor=sensor, kind=kind)
+def law(kind, sensor=None, only=None):
+    return SimpleNamespace(effect=kind.effect, sensor=sensor, kind=kind, only=only)
 
 
 def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0, doubt=None, complete=False,
@@ -85,3 +90,28 @@ def test_recordings_held_out_are_evidence_of_their_own_for_the_first_law():
 
 def test_a_loss_on_rows_held_out_is_never_claimed():
     assert step_presence(found(law(GearFriction)), 0, HeldOut(gain=-1.0)) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "expected"), [(0.0075, False), (0.021, False), (0.023, True), (-0.023, True)]
+)
+def test_an_effect_must_differ_from_zero_by_two_of_its_own_deviations(amplitude, expected):
+    figures = {"amplitude_Nm": {"value": amplitude, "std": 0.0108},
+               "angle_rad": {"value": 3.1, "std": 2.2}}  # fmt: skip
+    assert exceeds_deviations(figures) is expected
+
+
+def test_one_figure_beyond_its_deviations_is_enough_and_without_deviations_nothing_is_refuted():
+    both = {"wheel_rad": {"value": 0.0, "std": 6e-4}, "worm_rad": {"value": 2e-4, "std": 3e-6}}
+    assert exceeds_deviations(both)
+    assert exceeds_deviations({"order": {"value": 0.1, "std": None}})
+    assert exceeds_deviations({})
+
+
+@pytest.mark.parametrize(("tempering", "claimed"), [(0.5, True), (0.01, False)])
+def test_a_torque_that_acts_once_is_not_claimed_where_innovations_depend_everywhere(
+    tempering, claimed
+):
+    once = found(law(LoadDisturbance, only="rec2.csv"), gain=3000.0, ratio=100.0,
+                 tempering=tempering)  # fmt: skip
+    assert (step_presence(once, 0, None) >= 0.5) is claimed
