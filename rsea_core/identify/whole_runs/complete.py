@@ -30,7 +30,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
-from rsea_core.identify.whole_runs.outcome import (
+from rsea_core.identify.whole_runs.nearly_complete import (
     complete_by,
     first_law,
     in_own_share,

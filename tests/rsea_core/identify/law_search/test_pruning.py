@@ -2,6 +2,7 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from rsea_core.identify.law_search import pruning
@@ -11,19 +12,26 @@ from rsea_core.identify.multistep.criteria import KEPT_RATIO, UNEVEN_GAIN
 
 
 def step(key, *, gain=40.0 * UNEVEN_GAIN, ratio=0.95 * KEPT_RATIO):
-    return SimpleNamespace(law=SimpleNamespace(key=key, only=None), gain=gain, ratio=ratio)
+    law = SimpleNamespace(key=key, only=None, unknowns=())
+    return SimpleNamespace(law=law, gain=gain, ratio=ratio)
 
 
 def found(*steps, whole=None):
     """What windows found, and the law that alone explains most of whole recordings."""
     of_whole = None if whole is None else SimpleNamespace(steps=[step(whole)])
-    return Found(problem=None, base_estimator=None, base=None, estimator=None, best=None,
+    estimator = SimpleNamespace(problem=SimpleNamespace(nominals=()), fit=fit)
+    best = fit(SimpleNamespace(laws=tuple(s.law for s in steps)), np.zeros(0))
+    return Found(problem=None, base_estimator=None, base=None, estimator=estimator, best=best,
                  horizon=None, steps=list(steps), of_whole=of_whole)  # fmt: skip
 
 
+def fit(hypothesis, x, iterations=0):
+    return SimpleNamespace(hypothesis=hypothesis, x=x)
+
+
 @pytest.fixture(autouse=True)
-def removed(monkeypatch):
-    monkeypatch.setattr(pruning, "_without", lambda found, law: (None, None))
+def fits_stay(monkeypatch):
+    monkeypatch.setattr(pruning, "settled", lambda estimator, fit, once: (estimator, fit))
 
 
 def test_a_law_that_gains_unevenly_is_refused():

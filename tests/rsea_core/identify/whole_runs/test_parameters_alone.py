@@ -38,12 +38,12 @@ def precise(tmp_path_factory):
 
 def test_steps_are_shortened_until_they_no_longer_cause_the_misfit(precise):
     own, plain = precise
-    said = []
-    finer, fit, left = parameters_alone(own, plain, said.append)
+    lines = []
+    finer, fit, left = parameters_alone(own, plain, lines.append)
     coarse = own.problem.steps.fineness
-    assert finer.problem.steps.fineness < coarse, said
+    assert finer.problem.steps.fineness < coarse, lines
     assert left < SOUND
-    assert any("half of a step" in line for line in said)
+    assert any("half of a step" in line for line in lines)
     half = in_steps(
         finer, finer.problem.steps._replace(fineness=0.5 * finer.problem.steps.fineness)
     )

@@ -56,12 +56,12 @@ def test_a_held_command_is_found_before_a_late_current_is_claimed(tmp_path):
         supply_voltage_V=24.0, current_sensor_noise_A=NOISE["current_A"],
     )  # fmt: skip
     case = axis_case(tmp_path, held_voltage_recording(rig, 1), rig=rig)
-    said = []
-    begin = in_true_noise(begun(case, CommandTiming(linear=True), said.append))
-    found, nearly = with_whole_runs(begin, said.append)
+    lines = []
+    begin = in_true_noise(begun(case, CommandTiming(linear=True), lines.append))
+    found, nearly = with_whole_runs(begin, lines.append)
     found = nearly or found
 
-    assert [step.law.sensor for step in found.steps] == [None], said
+    assert [step.law.sensor for step in found.steps] == [None], lines
     assert not found.problem.timing.linear
     _, laws = found.problem.values(found.best.hypothesis, found.best.x)
     (late,) = [v["delay_s"] for v in laws if "delay_s" in v]
