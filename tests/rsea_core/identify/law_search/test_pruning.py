@@ -12,7 +12,7 @@ from rsea_core.identify.multistep.criteria import KEPT_RATIO, UNEVEN_GAIN
 
 
 def step(key, *, gain=40.0 * UNEVEN_GAIN, ratio=0.95 * KEPT_RATIO):
-    law = SimpleNamespace(key=key, only=None, unknowns=())
+    law = SimpleNamespace(key=key, only=None, unknowns=(SimpleNamespace(scale=1.0),))
     return SimpleNamespace(law=law, gain=gain, ratio=ratio)
 
 
@@ -20,7 +20,7 @@ def found(*steps, whole=None):
     """What windows found, and the law that alone explains most of whole recordings."""
     of_whole = None if whole is None else SimpleNamespace(steps=[step(whole)])
     estimator = SimpleNamespace(problem=SimpleNamespace(nominals=()), fit=fit)
-    best = fit(SimpleNamespace(laws=tuple(s.law for s in steps)), np.zeros(0))
+    best = fit(SimpleNamespace(laws=tuple(s.law for s in steps)), np.zeros(len(steps)))
     return Found(problem=None, base_estimator=None, base=None, estimator=estimator, best=best,
                  horizon=None, steps=list(steps), of_whole=of_whole)  # fmt: skip
 
