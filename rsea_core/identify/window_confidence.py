@@ -55,8 +55,6 @@ def step_presence(found: Found, number: int, unseen: HeldOut | None) -> float:
     seen *= _above(step.gain, GAIN_AT, GAIN_SCALE)
     if unseen is not None and unseen.gain <= 0.0:
         seen = min(seen, UNCLAIMED)  # no better than parameters where it was not fitted
-    if step.law.only is not None and step.tempering < LEAST_INDEPENDENT:
-        seen = min(seen, UNCLAIMED)  # where a model is wrong in every stretch, one is no event
     later = FURTHER[min(number, len(FURTHER) - 1)]
     if number:  # what a first law is not quite has names too, but scatters between stretches
         later *= _above(ratio, FURTHER_RATIO_AT, FURTHER_RATIO_SCALE)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.gear_friction import GearFriction
-from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_friction_angle import LoadFrictionAngle
 from rsea_core.effects.sensor_scale import SensorScale
@@ -21,8 +20,8 @@ from rsea_core.identify.window_confidence import (
 from rsea_core.machine.rig import Rig
 
 
-def law(kind, sensor=None, only=None):
-    return SimpleNamespace(effect=kind.effect, sensor=sensor, kind=kind, only=only)
+def law(kind, sensor=None):
+    return SimpleNamespace(effect=kind.effect, sensor=sensor, kind=kind)
 
 
 def found(taken, *rivals, gain=200.0, ratio=30.0, tempering=1.0, doubt=None, complete=False,
@@ -106,12 +105,3 @@ def test_one_figure_beyond_its_deviations_is_enough_and_without_deviations_nothi
     assert exceeds_deviations(both)
     assert exceeds_deviations({"order": {"value": 0.1, "std": None}})
     assert exceeds_deviations({})
-
-
-@pytest.mark.parametrize(("tempering", "claimed"), [(0.5, True), (0.01, False)])
-def test_a_torque_that_acts_once_is_not_claimed_where_innovations_depend_everywhere(
-    tempering, claimed
-):
-    once = found(law(LoadDisturbance, only="rec2.csv"), gain=3000.0, ratio=100.0,
-                 tempering=tempering)  # fmt: skip
-    assert (step_presence(once, 0, None) >= 0.5) is claimed
