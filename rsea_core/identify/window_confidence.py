@@ -62,7 +62,7 @@ def step_presence(found: Found, number: int, unseen: HeldOut | None) -> float:
 
 
 def exceeds_deviations(figures: dict) -> bool:
-    """Whether any of an effect's figures is further from zero than two of its own deviations."""
+    """Whether any figure of an effect differs from zero by more than two standard deviations."""
     known = [f for f in figures.values() if f.get("std")]
     return not known or any(abs(f["value"]) > LEAST_DEVIATIONS * f["std"] for f in known)
 

@@ -135,7 +135,7 @@ class WindowVerdict(Conclusion):
             there = there and exceeds_deviations(self._figures(first))
             if there or self.delayed is not None:
                 return "missing-physics"
-            much = self.dependent or any(_gains_much(step) for step in self.found.steps)
+            much = any(_gains_much(step) for step in self.found.steps)
             return "unexplained" if much else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"

@@ -78,9 +78,9 @@ class Found:
         Cost of these errors above that of the noise, in units.
     sound_below : float
         Misfit, in these deviations, below which parameters alone are sufficient.
-    of_whole : Found or None
-        The law that alone explains most of the errors of the whole recordings fitted, complete if
-        windows confirm it.
+    by_whole_runs : Found or None
+        The law that alone explains most of the errors of the whole recordings fitted; it is claimed
+        if windows confirm it.
     complete : bool
         Whether laws stand by whole recordings: they leave nothing but that noise, or little more.
     explained : float
@@ -106,7 +106,7 @@ class Found:
     left_by_parameters: float = np.inf
     excess: float = 0.0
     sound_below: float = SOUND
-    of_whole: "Found | None" = None
+    by_whole_runs: "Found | None" = None
     complete: bool = False
     explained: float = 1.0
 
@@ -126,12 +126,12 @@ class Found:
         return all(step.law.effect == LoadDisturbance.effect for step in self.steps)
 
     @property
-    def agrees_with_whole(self) -> bool:
-        """Whether windows show one law, by far, and it is that of whole recordings."""
-        if self.of_whole is None or len(self.steps) != 1:
+    def confirms_whole_runs(self) -> bool:
+        """Whether windows show a single law, with a large gain, that whole recordings show too."""
+        if self.by_whole_runs is None or len(self.steps) != 1:
             return False
         step = self.steps[0]
-        return step.gain > UNEVEN_GAIN and step.law.key == self.of_whole.steps[0].law.key
+        return step.gain > UNEVEN_GAIN and step.law.key == self.by_whole_runs.steps[0].law.key
 
     @property
     def predicts_longer(self) -> bool:

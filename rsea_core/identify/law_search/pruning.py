@@ -42,13 +42,13 @@ def pruned(found, say) -> bool:
 
 
 def without_weak_end(found) -> None:
-    """Take out last laws that gain unevenly; the first of them is kept as refused.
+    """Remove last laws that gain unevenly; the first of them is kept as refused.
 
-    A law alone stays if it also explains most of the errors of whole recordings, which no unknown
-    torque compensates: windows may show a late reading only where a motion begins.
+    A single law stays if it also explains most of the errors of whole recordings, where no unknown
+    torque compensates for it: windows may show a delayed reading only where a motion begins.
     """
     while found.steps and found.steps[-1].law.only is None and found.steps[-1].ratio < KEPT_RATIO:
-        if found.agrees_with_whole:
+        if found.confirms_whole_runs:
             break
         own, fit = _without(found, found.steps[-1].law)
         found.estimator, found.best = own, fit

@@ -3,15 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.effects.sensor_delay import SensorDelay
+from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import count_values, far_from_rig
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.hold_out import held_out_in_short_windows
 from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.search import begun, laws_of
 from rsea_core.identify.law_search.shape_search import shapes
-from rsea_core.identify.multistep.command_timing import timings
+from rsea_core.identify.multistep.command_timing import CommandTiming, timings
 from rsea_core.identify.multistep.criteria import (
     COMPLETE,
     COMPLETE_SHARE,
@@ -98,7 +100,7 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     other = _with_other_timing(search, say) if again and search.taken else None
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
         return other
-    return (found if nearly else replace(found, of_whole=first_law(found, search))), nearly
+    return (found if nearly else replace(found, by_whole_runs=first_law(found, search))), nearly
 
 
 def _finished(
@@ -108,7 +110,7 @@ def _finished(
 
     None where they do not predict rows unseen.
     """
-    other = _without_late_reading(search, say, again=again)
+    other = _without_delayed_reading(search, say, again=again)
     if other is not None:
         return other
     search.refine(say)
@@ -121,7 +123,7 @@ def _finished(
         if other is not None and other[0].complete:
             return other
         search.add_last(say)
-        other = _without_late_reading(search, say, again=again)
+        other = _without_delayed_reading(search, say, again=again)
         if other is not None:
             return other
     of_log = found.sound and _within_half_a_row(search)
@@ -159,35 +161,45 @@ def _within_half_a_row(search: WholeSearch) -> bool:
     return any(abs(delay_s) < 0.5 * row_s for delay_s in late)
 
 
-def _without_late_reading(
+def _without_delayed_reading(
     search: WholeSearch, say, *, again: bool
 ) -> tuple[Found, Found | None] | None:
-    """Take out late readings that another delay of the commands explains as well.
+    """Remove delayed readings where another timing of the commands explains as much.
+
+    A held command changes the current at once: if it is assumed to be linear between rows, the
+    current seems delayed. A delayed reading that is the only law stays where commands act at the
+    same times: the fit of parameters alone has estimated their delay already.
 
     Returns
     -------
     tuple or None
-        The search (`with_whole_runs`) with commands at other times that explain as much, if its
-        laws are complete or nearly so. A held command changes the current at once; if it is taken
-        for linear, the current seems early or late.
+        The search (`with_whole_runs`) with another timing that explains as much, if parameters
+        suffice there, or its laws are complete or nearly so.
     """
     own, case = search.own, search.own.problem.case
     for law in [w for w in search.taken if w.kind is SensorDelay]:
         less = without(own, search.fit, law)
         for timing in (own.problem.timing, *timings(case, own.problem.timing)):
-            problem = MultistepProblem(case, timing=timing, steps=own.problem.steps)
-            fit = with_best_delay(with_problem(own, problem), less.hypothesis, less.x)
+            same = timing is own.problem.timing
+            if not (len(search.taken) > 1 if same else again):
+                continue
+            fit = _with_timing(own, timing, less.hypothesis, less.x)
             if not fit.cost < search.fit.cost + LEAST_GAIN:
                 continue
-            say(f"  whole recordings: other times of commands explain as much as {law.key}")
-            if timing is own.problem.timing:
+            say(f"  whole recordings: another timing of commands explains as much as {law.key}")
+            if same:
                 search.fit, search.taken = fit, [w for w in search.taken if w is not law]
                 break
-            if again:
-                other = with_whole_runs(begun(case, timing, say), say, again=False)
-                if other[0].complete or other[1] is not None:
-                    return other
+            found, nearly = with_whole_runs(begun(case, timing, say), say, again=False)
+            if found.complete or found.sound or nearly is not None:
+                return found, nearly
     return None
+
+
+def _with_timing(own: Estimator, timing: CommandTiming, h: Hypothesis, x: NDArray) -> Estimate:
+    """A fit of whole recordings with a timing of the commands, from their best delay."""
+    problem = MultistepProblem(own.problem.case, timing=timing, steps=own.problem.steps)
+    return with_best_delay(with_problem(own, problem), h, x)
 
 
 def _with_other_timing(
@@ -206,8 +218,7 @@ def _with_other_timing(
     least *= search.excess()
     least = max(search.doubt(), least or LEAST_OF_LEFT * search.plain_excess())
     for timing in timings(case, own.problem.timing):
-        problem = MultistepProblem(case, timing=timing, steps=own.problem.steps)
-        fit = with_best_delay(with_problem(own, problem), h, search.fit.x)
+        fit = _with_timing(own, timing, h, search.fit.x)
         if fit.cost < search.fit.cost - least:
             say("searched again: with laws of whole recordings, commands act at other times")
             return with_whole_runs(begun(case, timing, say), say, again=False)
@@ -236,11 +247,11 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
             return nearly
     if not found.steps:
         return _with_shape(found, own, say)
-    if found.agrees_with_whole:
-        unseen = held_out_in_short_windows(found.of_whole)
+    if found.confirms_whole_runs:
+        unseen = held_out_in_short_windows(found.by_whole_runs)
         if unseen is not None and unseen.gain > 0.0:
-            say(f"whole recordings: windows show {found.steps[0].law.key} too")
-            return found.of_whole
+            say(f"whole recordings: windows confirm {found.steps[0].law.key}")
+            return found.by_whole_runs
     say(f"whole recordings: what windows showed leaves {left:.2f}")
     if far_from_rig(found.problem, found.best.x):
         found, fit, left = _closer_to_rig(found, own, fit, say)

@@ -1,4 +1,4 @@
-"""Laws of whole recordings as what was found: all that is left, or nearly all of it."""
+"""Laws of whole recordings, complete or nearly so, as the result of a search."""
 
 from dataclasses import replace
 
@@ -94,10 +94,10 @@ def _alone(search: WholeSearch) -> list[Trial]:
 
 
 def first_law(found: Found, search: WholeSearch) -> Found | None:
-    """The first law alone if it explains most of what parameters leave of the rows fitted.
+    """The first law alone, if it explains most of what parameters leave of the rows fitted.
 
-    Rows unseen do not confirm it: where nothing pulls a machine back, a random torque moves it as
-    far as what parameters leave.
+    Rows unseen may not confirm it: without a restoring torque, a random torque causes errors there
+    that are as large as those of parameters alone.
     """
     for trial in search.first[:1]:
         left = excess(search.own, trial.fit.hypothesis, trial.fit.x)
@@ -111,7 +111,7 @@ def first_law(found: Found, search: WholeSearch) -> Found | None:
 def _by_one_law(
     found: Found, search: WholeSearch, trial: Trial, ratio: float, explained: float
 ) -> Found:
-    """The search's trial of one law as what was found."""
+    """One trial, with its law alone, as the result of a search."""
     search.fit, search.taken = trial.fit, [trial.law]
     search.rivals, search.ratios = {trial.law.key: search.first}, {trial.law.key: ratio}
     return replace(complete_by(found, search), explained=explained)

@@ -1,7 +1,7 @@
-"""Parameters alone fitted to whole recordings, in engine steps that these do not show.
+"""Parameters alone fitted to whole recordings, with steps of the engine that are short enough.
 
-In windows an engine's error stays small; over a whole recording of a machine that nothing pulls
-back it accumulates, and passes for missing physics where sensors are fine.
+In windows the engine's error stays small. Over a whole recording of a machine without a restoring
+torque it accumulates, and where sensors are precise it is mistaken for missing physics.
 """
 
 import numpy as np
@@ -23,8 +23,8 @@ def parameters_alone(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Est
     Parameters
     ----------
     own : Estimator
-        Of whole recordings (`in_sensor_noise`); the one returned has shorter engine steps where
-        half of a step changes the errors by more than a share of what they are.
+        Of whole recordings (`in_sensor_noise`). The one returned has shorter engine steps if half
+        of a step changes the errors by more than `STEP_SHARE` of the misfit.
     """
     own, plain, left = _in_fine_steps(own, own.fit(fit.hypothesis, fit.x, iterations=12), say)
     if SOUND < left < np.inf:
@@ -33,7 +33,7 @@ def parameters_alone(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Est
 
 
 def _in_fine_steps(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Estimate, float]:
-    """An estimator in steps that do not cause the misfit, the fit continued, and its misfit."""
+    """An estimator whose steps do not cause the misfit, the fit continued with it, its misfit."""
     h, left = fit.hypothesis, misfit(own, fit.hypothesis, fit.x)
     while SOUND < left < np.inf and own.problem.steps.fineness > LEAST_FINENESS:
         steps = own.problem.steps
@@ -44,8 +44,8 @@ def _in_fine_steps(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Estim
         fit = finer.fit(h, fit.x, iterations=12)
         own, before, left = finer, left, misfit(finer, h, fit.x)
         say(
-            f"  whole recordings: half of a step moves errors by {moved:.2g} deviations, parameters"
-            f" leave {left:.2f} in place of {before:.2f}"
+            f"  whole recordings: half of the engine's step changes errors by {moved:.2g}"
+            f" deviations; with it parameters leave {left:.2f} instead of {before:.2f}"
         )
     return own, fit, left
 

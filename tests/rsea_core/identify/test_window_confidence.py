@@ -94,13 +94,13 @@ def test_a_loss_on_rows_held_out_is_never_claimed():
 @pytest.mark.parametrize(
     ("amplitude", "expected"), [(0.0075, False), (0.021, False), (0.023, True), (-0.023, True)]
 )
-def test_an_effect_must_differ_from_zero_by_two_of_its_own_deviations(amplitude, expected):
+def test_a_figure_must_differ_from_zero_by_two_standard_deviations(amplitude, expected):
     figures = {"amplitude_Nm": {"value": amplitude, "std": 0.0108},
                "angle_rad": {"value": 3.1, "std": 2.2}}  # fmt: skip
     assert exceeds_deviations(figures) is expected
 
 
-def test_one_figure_beyond_its_deviations_is_enough_and_without_deviations_nothing_is_refuted():
+def test_one_such_figure_is_enough_and_a_figure_without_a_deviation_refutes_nothing():
     both = {"wheel_rad": {"value": 0.0, "std": 6e-4}, "worm_rad": {"value": 2e-4, "std": 3e-6}}
     assert exceeds_deviations(both)
     assert exceeds_deviations({"order": {"value": 0.1, "std": None}})

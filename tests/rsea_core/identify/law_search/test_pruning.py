@@ -1,4 +1,4 @@
-"""A law that gains in few stretches of rows is taken out, unless whole recordings show it too."""
+"""A law that gains in few stretches of rows is removed, unless whole recordings show it too."""
 
 from types import SimpleNamespace
 
@@ -18,11 +18,11 @@ def step(key, *, gain=40.0 * UNEVEN_GAIN, ratio=0.95 * KEPT_RATIO):
 
 def found(*steps, whole=None):
     """What windows found, and the law that alone explains most of whole recordings."""
-    of_whole = None if whole is None else SimpleNamespace(steps=[step(whole)])
+    by_whole_runs = None if whole is None else SimpleNamespace(steps=[step(whole)])
     estimator = SimpleNamespace(problem=SimpleNamespace(nominals=()), fit=fit)
     best = fit(SimpleNamespace(laws=tuple(s.law for s in steps)), np.zeros(len(steps)))
     return Found(problem=None, base_estimator=None, base=None, estimator=estimator, best=best,
-                 horizon=None, steps=list(steps), of_whole=of_whole)  # fmt: skip
+                 horizon=None, steps=list(steps), by_whole_runs=by_whole_runs)  # fmt: skip
 
 
 def fit(hypothesis, x, iterations=0):

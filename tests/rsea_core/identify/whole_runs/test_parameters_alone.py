@@ -1,4 +1,4 @@
-"""An engine's error over whole recordings is removed before it passes for missing physics."""
+"""The engine's error over whole recordings is not mistaken for missing physics."""
 
 from dataclasses import replace
 
@@ -43,7 +43,7 @@ def test_steps_are_shortened_until_they_no_longer_cause_the_misfit(precise):
     coarse = own.problem.steps.fineness
     assert finer.problem.steps.fineness < coarse, lines
     assert left < SOUND
-    assert any("half of a step" in line for line in lines)
+    assert any("half of the engine's step" in line for line in lines)
     half = in_steps(
         finer, finer.problem.steps._replace(fineness=0.5 * finer.problem.steps.fineness)
     )

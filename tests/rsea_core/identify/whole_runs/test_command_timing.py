@@ -1,6 +1,7 @@
-"""A command taken for linear makes a current seem late: its times are tried before a late reading.
+"""Another timing of the commands is tried before a delayed reading is claimed.
 
-Without winding inductance a held command changes the current at once.
+Without winding inductance a held command changes the current at once: if it is assumed to be linear
+between rows, the current seems delayed.
 """
 
 from dataclasses import replace
@@ -20,7 +21,7 @@ from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.recording import Recording
 from tests.cases.one_axis import ROW_s, axis_case, axis_rig
 
-LATE_ROWS = 1.23
+DELAY_ROWS = 1.23
 FRICTION_Nm = 0.06
 NOISE = {"motor_angle_rad": 1e-4, "current_A": 2e-3}
 
@@ -32,7 +33,7 @@ def held_voltage_recording(rig, seed: int) -> Recording:
     voltage = sum(2.0 * np.sin(2.0 * np.pi * f * time + rng.uniform(0.0, 6.0))
                   for f in (0.4, 1.1, 3.1))  # fmt: skip
     inputs = Inputs(time_s=time, voltage_V=voltage, load=Load(kind="free"))
-    terms = (LoadFriction(coulomb_Nm=FRICTION_Nm), DriveDelay(delay_s=LATE_ROWS * ROW_s))
+    terms = (LoadFriction(coulomb_Nm=FRICTION_Nm), DriveDelay(delay_s=DELAY_ROWS * ROW_s))
     out = Replay.of(inputs, step_s=1e-3).run(ActuatorModel(rig, terms))
     columns = {"time_s": time, "voltage_V": voltage}
     for name, noise in NOISE.items():
@@ -50,7 +51,7 @@ def in_true_noise(found: Found) -> Found:
     return replace(found, base_estimator=found.base_estimator.having(tracks))
 
 
-def test_a_held_command_is_found_before_a_late_current_is_claimed(tmp_path):
+def test_a_held_command_is_found_before_a_delayed_current_is_claimed(tmp_path):
     rig = replace(
         axis_rig(), terminal_resistance_ohm=2.0, back_emf_constant_Vs_per_rad=0.5,
         supply_voltage_V=24.0, current_sensor_noise_A=NOISE["current_A"],
@@ -60,9 +61,8 @@ def test_a_held_command_is_found_before_a_late_current_is_claimed(tmp_path):
     begin = in_true_noise(begun(case, CommandTiming(linear=True), lines.append))
     found, nearly = with_whole_runs(begin, lines.append)
     found = nearly or found
-
     assert [step.law.sensor for step in found.steps] == [None], lines
     assert not found.problem.timing.linear
     _, laws = found.problem.values(found.best.hypothesis, found.best.x)
-    (late,) = [v["delay_s"] for v in laws if "delay_s" in v]
-    assert abs(late - LATE_ROWS * ROW_s) < 0.05 * ROW_s
+    (delay_s,) = [v["delay_s"] for v in laws if "delay_s" in v]
+    assert abs(delay_s - DELAY_ROWS * ROW_s) < 0.05 * ROW_s
