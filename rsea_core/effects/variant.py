@@ -131,6 +131,7 @@ AT_ONE = (
     "backdrive_efficiency",
     "stiffness_ratio_at_0p15rad",
     "stiffness_after_over_before",
+    "stiffness_rise_fast_over_static",
     "exponent",
     "scale",
 )

@@ -14,7 +14,6 @@ from rsea_core.identify.multistep.criteria import (
     GAIN_SCALE,
     HIGHEST,
     INDEPENDENT,
-    LEAST_DEVIATIONS,
     LEAST_INDEPENDENT,
     NO_PREDICTION,
     PREDICTION,
@@ -59,12 +58,6 @@ def step_presence(found: Found, number: int, unseen: HeldOut | None) -> float:
     if number:  # what a first law is not quite has names too, but scatters between stretches
         later *= _above(ratio, FURTHER_RATIO_AT, FURTHER_RATIO_SCALE)
     return float(seen * later)
-
-
-def exceeds_deviations(figures: dict) -> bool:
-    """Whether any figure of an effect differs from zero by more than two standard deviations."""
-    known = [f for f in figures.values() if f.get("std")]
-    return not known or any(abs(f["value"]) > LEAST_DEVIATIONS * f["std"] for f in known)
 
 
 def makes_predictable(found: Found) -> bool:

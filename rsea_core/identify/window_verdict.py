@@ -12,6 +12,7 @@ from rsea_core.identify.candidates.catalogue import of_one_body, rivals_of
 from rsea_core.identify.candidates.rig_parameters import place_of
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
+from rsea_core.identify.judgement.reported_values import shown
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
@@ -37,11 +38,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.result.conclusion import Conclusion
-from rsea_core.identify.window_confidence import (
-    exceeds_deviations,
-    step_confidence,
-    step_presence,
-)
+from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.identify.window_findings import stands
 from rsea_core.identify.window_fit import (
     FoundFit,
@@ -132,7 +129,7 @@ class WindowVerdict(Conclusion):
         if self.found.steps:
             first = len(self.fit.hypothesis.laws) - len(self.found.steps)
             there = step_presence(self.found, 0, self.held_out) >= 0.5
-            there = there and exceeds_deviations(self._figures(first))
+            there = there and shown(self._figures(first))
             if there or self.delayed is not None:
                 return "missing-physics"
             much = any(_gains_much(step) for step in self.found.steps)
@@ -180,7 +177,7 @@ class WindowVerdict(Conclusion):
         first = len(self.fit.hypothesis.laws) - len(self.found.steps)
         for number, step in enumerate(self.found.steps):
             confidence, figures = self.step_confidence(number), self._figures(first + number)
-            if self.verdict == "unexplained" or not exceeds_deviations(figures):
+            if self.verdict == "unexplained" or not shown(figures):
                 confidence = min(confidence, UNCLAIMED)
             scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
             alike = [w.effect for w, g in rivals_of(step.law, step.rivals) if step.gain - g < scale]

@@ -14,10 +14,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.engines.fixed_step.replay import CHANNELS
-from rsea_core.recordings.case import Case
+from rsea_core.identify.multistep.criteria import APPLIED_CURRENT
+from rsea_core.recordings.case import Case, apparent_noise, noise_floor
+from rsea_core.recordings.recording import Recording
 
 UNEVEN = 2e-3  # of a row: rms deviation of the stamps below which they are even
 FARTHEST = 0.5  # of a row: a stamp further from its even time belongs to another row
+CURRENT_ROWS = 4  # commands to which the current of a row is compared: its own and those before
 CURRENT = CHANNELS.index("current_A")
 SPEED_OF = tuple(
     (CHANNELS.index(f"{part}_angle_rad"), CHANNELS.index(f"{part}_velocity_rad_per_s"))
@@ -68,6 +71,39 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
                  for r in driven)  # fmt: skip
     rows = [t for t in RowTimes if uneven and t is not timing.rows]
     return [replace(timing, rows=t) for t in rows] + [replace(timing, linear=not timing.linear)]
+
+
+def current_is_commanded(case: Case) -> bool:
+    """Whether an amplifier's current is that of the commands that the log holds.
+
+    A loop that runs faster than its log, or an amplifier that is slow, applies currents of which no
+    row tells; then a measured current is no reading of what the model simulates. Compared are the
+    fastest errors of a regression on the last commands, which the laws of a sensor or a drive
+    (offset, drift, scale, delay, saturation) leave as small as the sensor's noise in at least one
+    recording.
+    """
+    read = [
+        r for r in case.identification
+        if r.command_name == "current_command_A" and "current_A" in r.responses
+    ]  # fmt: skip
+    floors = [noise_floor(case.rig, r, order=4)["current_A"] for r in read]
+    return any(
+        _noise_left_by_commands(r) < APPLIED_CURRENT * floor
+        for r, floor in zip(read, floors, strict=True)
+    )
+
+
+def _noise_left_by_commands(r: Recording) -> float:
+    """Apparent noise [A] of a current beside a linear function of its last commands."""
+    command, current = r["current_command_A"], r["current_A"]
+    rows, last = r.rows, CURRENT_ROWS - 1
+    if rows < 2 * CURRENT_ROWS:
+        return np.inf
+    columns = [command[last - j : rows - j] for j in range(CURRENT_ROWS)]
+    columns += [np.ones(rows - last), r.time_s[last:]]
+    design = np.stack(columns, axis=1)
+    left = current[last:] - design @ np.linalg.lstsq(design, current[last:], rcond=None)[0]
+    return apparent_noise(left, order=2)
 
 
 def runs_at(

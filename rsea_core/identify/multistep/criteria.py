@@ -11,6 +11,9 @@ LEAST_ROWS = 10  # of a window
 QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
 PREDICTABLE = 1.0  # time scales of the motion: windows in which chaotic motions are predictable
 SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
+APPLIED_CURRENT = (
+    3.0  # of the sensor's noise: larger errors beside the commands are another current
+)
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
 TIMING_DOUBT = 10.0  # units: a difference that does not tell a linear command from a held one
 TIMING_SHARE = 0.1  # of the least law's gain, that another timing must gain for a new search
@@ -142,7 +145,6 @@ INDEPENDENT = 0.6  # share of independent innovations below which a law is not a
 LEAST_INDEPENDENT = 0.1  # of that share, for a law that gains evenly is one of the things there
 HIGHEST, UNCLAIMED = 0.97, 0.45  # confidences
 FURTHER = (1.0, 0.9)  # factors of the first and the second law's
-LEAST_DEVIATIONS = 2.0  # from zero, of at least one figure of a claimed effect
 FURTHER_RATIO_AT, FURTHER_RATIO_SCALE = 11.0, 1.0  # gain over its deviation of a further law
 UNKNOWN_SHARE = 0.005  # of the usual torque: a smaller unknown one is not stated
 DELAY_ROWS = 1.5  # a row of the log and half a row of hold; a later command is late in the drive

@@ -33,6 +33,7 @@ from rsea_core.identify.multistep.command_timing import (
     AS_LOGGED,
     CommandTiming,
     RowTimes,
+    current_is_commanded,
     even_times,
     runs_at,
 )
@@ -183,9 +184,16 @@ class Experiment:
 
 def experiment(
     model: ActuatorModel, r: Recording, where: RunConditions, *,
-    timing: CommandTiming = AS_LOGGED, steps: EngineSteps = FIRST,
+    timing: CommandTiming = AS_LOGGED, steps: EngineSteps = FIRST, current_commanded: bool = False,
 ) -> Experiment:  # fmt: skip
-    """A recording under a command that is held from row to row, or moves linearly."""
+    """A recording under a command that is held from row to row, or moves linearly.
+
+    Parameters
+    ----------
+    current_commanded : bool
+        Whether a current that is read beside a command of current is that one's
+        (`current_is_commanded`), and so predicted.
+    """
     inputs = r.inputs()
     even = None if timing.rows is RowTimes.LOGGED else even_times(r.time_s)
     if even is not None:
@@ -210,7 +218,10 @@ def experiment(
     step = float(np.clip(cycle / steps.per_cycle, LEAST_STEP_s, r.sample_time_s))
     step = min(step, longest_step_s(numbers.plant, numbers.spring, numbers.fx) / STEP_PER_MODE)
     replay = Replay.of(inputs, step_s=steps.fineness * step, **of_rows, **more)
-    channels = tuple(name for name in READ if name in r.responses and _predicted(name, r, replay))
+    channels = tuple(
+        name for name in READ
+        if name in r.responses and _predicted(name, r, replay, current_commanded)
+    )  # fmt: skip
     channels += tuple(v for a, v in VELOCITIES.items() if v in r.responses and a not in r)
     require_comparable(r, channels)
     if r.rows < LEAST_ROWS:
@@ -260,9 +271,10 @@ def _motion_rate(r: Recording) -> float:
     return max(rates)
 
 
-def _predicted(name: str, r: Recording, replay: Replay) -> bool:
+def _predicted(name: str, r: Recording, replay: Replay, current_commanded: bool) -> bool:
     if name == "current_A":
-        return r.command_name in ("duty", "voltage_V")
+        of_command = r.command_name == "current_command_A" and current_commanded
+        return of_command or r.command_name in ("duty", "voltage_V")
     if name == "spring_deflection_rad":
         return not replay.is_bench
     return not (name == "load_angle_rad" and r.load.kind == "imposed")
@@ -293,7 +305,9 @@ class MultistepProblem(Problem):
         self, case: Case, *, timing: CommandTiming = AS_LOGGED, steps: EngineSteps = FIRST
     ):
         self.timing, self.steps = timing, steps
-        super().__init__(as_logged(case))
+        case = as_logged(case)
+        self.current_commanded = current_is_commanded(case)
+        super().__init__(case)
         self.nominals = tuple(self._scaled(n) for n in self.nominals)
 
     @property
@@ -349,4 +363,7 @@ class MultistepProblem(Problem):
         return bench.readings(bench.runs(machines, None), machines)
 
     def _bench(self, r: Recording, where: RunConditions) -> Experiment:
-        return experiment(self.model, r, where, timing=self.timing, steps=self.steps)
+        return experiment(
+            self.model, r, where, timing=self.timing, steps=self.steps,
+            current_commanded=self.current_commanded,
+        )  # fmt: skip

@@ -13,7 +13,6 @@ from rsea_core.effects.spring_hardening import SpringHardening
 from rsea_core.identify import window_confidence
 from rsea_core.identify.law_search.hold_out import HeldOut
 from rsea_core.identify.window_confidence import (
-    exceeds_deviations,
     step_confidence,
     step_presence,
 )
@@ -89,19 +88,3 @@ def test_recordings_held_out_are_evidence_of_their_own_for_the_first_law():
 
 def test_a_loss_on_rows_held_out_is_never_claimed():
     assert step_presence(found(law(GearFriction)), 0, HeldOut(gain=-1.0)) < 0.5
-
-
-@pytest.mark.parametrize(
-    ("amplitude", "expected"), [(0.0075, False), (0.021, False), (0.023, True), (-0.023, True)]
-)
-def test_a_figure_must_differ_from_zero_by_two_standard_deviations(amplitude, expected):
-    figures = {"amplitude_Nm": {"value": amplitude, "std": 0.0108},
-               "angle_rad": {"value": 3.1, "std": 2.2}}  # fmt: skip
-    assert exceeds_deviations(figures) is expected
-
-
-def test_one_such_figure_is_enough_and_a_figure_without_a_deviation_refutes_nothing():
-    both = {"wheel_rad": {"value": 0.0, "std": 6e-4}, "worm_rad": {"value": 2e-4, "std": 3e-6}}
-    assert exceeds_deviations(both)
-    assert exceeds_deviations({"order": {"value": 0.1, "std": None}})
-    assert exceeds_deviations({})

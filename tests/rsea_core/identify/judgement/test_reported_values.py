@@ -1,4 +1,4 @@
-"""An effect is not claimed where no figure of it differs from zero."""
+"""An effect is not claimed where no figure of it differs from that of a machine without it."""
 
 import pytest
 
@@ -12,6 +12,10 @@ from rsea_core.identify.judgement.reported_values import shown
         ({"offset": (-0.0100, 0.0045)}, True),
         ({"scale": (1.02, 0.005)}, True),  # none of a scale is one
         ({"scale": (1.004, 0.005)}, False),
+        ({"drive_efficiency": (0.9965, 0.0164), "backdrive_efficiency": (0.9968, 0.0165)}, False),
+        ({"stiffness_rise_fast_over_static": (1.02, 0.015)}, False),
+        ({"torque_amplitude_Nm": (0.0075, 0.0108), "angle_rad": (3.1, 2.2)}, False),
+        ({"wheel_rad": (0.0, 6e-4), "worm_rad": (2e-4, 3e-6)}, True),  # one figure is enough
         ({"loop_width_Nm": (0.0, 0.02), "loop_energy_J": (0.0, 0.01)}, False),
         ({"resistance_rise_fraction": (0.01, 0.02), "peak_winding_C": (40.0, 3.0)}, True),
         ({"law": ("table", None)}, True),  # nothing to judge it by
