@@ -20,14 +20,18 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import even_ratio
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import (
+    ERRORS_BEYOND,
+    HALF,
+    HORIZONS,
     KEPT_RATIO,
+    LESS_ERROR,
     PREDICTABLE,
     SHORT,
     SILENT,
     UNEVEN_GAIN,
     WORSE,
 )
-from rsea_core.identify.multistep.estimator import Estimator
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import LEAST_ROWS, Experiment
 from rsea_core.identify.multistep.horizons import smooth, with_windows
 from rsea_core.identify.multistep.kalman_filter import huber_squares
@@ -132,9 +136,14 @@ def beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
     """What was found and what it gains on rows held out; without laws that lose there, if weak.
 
     Laws that lose in windows as long as the machine seemed predictable, and gain evenly in short
-    ones, are not refuted: the recordings held out are not predictable for so long.
+    ones, are not refuted: the recordings held out are not predictable for so long. Lasting laws
+    that matter there are refuted if no reading is predicted better (`predicts_better`): the noise
+    that they leave small makes any other model unlikely, however it predicts.
     """
     unseen = held_out(found) if found.steps else None
+    lasting = any(step.law.only is None for step in found.steps)
+    if unseen is not None and unseen.ratio and lasting and not predicts_better(found):
+        return found.parameters_alone(), None
     if unseen is None or unseen.gain >= WORSE:
         return found, unseen
     shorter = held_out_in_short_windows(found)
@@ -143,6 +152,47 @@ def beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
     if found.steps[0].gain > UNEVEN_GAIN and not found.sound:
         return found, unseen
     return found.parameters_alone(), None
+
+
+def predicts_better(found: Found) -> bool:
+    """Whether laws predict any reading of recordings held out better than parameters alone do.
+
+    In windows from one time scale to the longest in which the machine is predictable. Better are
+    root mean square errors lower by `LESS_ERROR`, if differences of windows' squared errors have a
+    mean beyond `ERRORS_BEYOND` of its standard errors; of fewer than three windows, errors half as
+    large.
+    """
+    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    longest = found.horizon or np.inf
+    for horizon in (h for h in HORIZONS if PREDICTABLE <= (h or np.inf) <= longest):
+        before = _squared_errors(found, unseen, found.base_estimator, found.base, horizon)
+        after = _squared_errors(found, unseen, found.estimator, found.best, horizon)
+        for name, old in before.items():
+            new, share = after[name], np.sqrt(np.mean(after[name]) / np.mean(old))
+            if len(old) < 3:
+                better = share < HALF
+            else:
+                apart = np.mean(old - new) / (np.std(old - new, ddof=1) / len(old) ** 0.5)
+                better = share < LESS_ERROR and apart > ERRORS_BEYOND
+            if better:
+                return True
+    return False
+
+
+def _squared_errors(
+    found: Found, experiments: list[Experiment], like: Estimator, fit: Estimate,
+    horizon: float | None,
+) -> dict[str, NDArray]:  # fmt: skip
+    """Mean squared errors of each reading in the windows of recordings (all windows,)."""
+    trial = (fit.hypothesis, fit.x)
+    own, errors = of_recordings(found, experiments, trial, horizon, like), {}
+    for t, residual in zip(own.tracks, own.residuals([trial]), strict=True):
+        first = t.windows.rows[:, 0]
+        sums = np.add.reduceat(residual[0] ** 2, first, axis=0)
+        means = sums / np.diff(np.append(first, t.experiment.rows))[:, None]
+        for j, name in enumerate(t.experiment.channels):
+            errors.setdefault(name, []).append(means[:, j])
+    return {name: np.concatenate(parts) for name, parts in errors.items()}
 
 
 def held_out_in_short_windows(found: Found) -> HeldOut | None:
@@ -216,13 +266,19 @@ def _power(innovations: list[NDArray]) -> float:
 
 
 def of_recordings(
-    found: Found, experiments: list[Experiment], trial, horizon: float | None
-) -> Estimator:
+    found: Found, experiments: list[Experiment], trial, horizon: float | None,
+    like: Estimator | None = None,
+) -> Estimator:  # fmt: skip
     """An estimator of other recordings, in windows of a length, noise and blocks of those fitted.
 
     Windows begin where the trial and the readings say together.
+
+    Parameters
+    ----------
+    like : Estimator or None
+        Whose noise and blocks are used; None: that of the laws found.
     """
-    like = found.estimator
+    like = like or found.estimator
     tracks = []
     for e in experiments:
         same = [t for t in like.tracks if t.experiment.channels == e.channels]
