@@ -23,7 +23,8 @@ from rsea_core.identify.multistep.criteria import (
     NEEDS_NO_WINDOWS,
     TIMING_SHARE,
 )
-from rsea_core.identify.multistep.horizons import likelier, relative_error, with_better_timing
+from rsea_core.identify.multistep.horizons import likelier, relative_error
+from rsea_core.identify.multistep.timing_choice import with_better_timing
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
 from rsea_core.identify.whole_runs.sensor_noise import refitted_from_rig
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings

@@ -4,8 +4,8 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.command_timing import CommandTiming
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
 from rsea_core.recordings.recording import Recording
 from tests.cases.one_axis import axis_case, axis_rig

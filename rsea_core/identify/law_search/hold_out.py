@@ -141,10 +141,10 @@ def beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
     that they leave small makes any other model unlikely, however it predicts.
     """
     unseen = held_out(found) if found.steps else None
-    lasting = any(step.law.only is None for step in found.steps)
-    if unseen is not None and unseen.ratio and lasting and not predicts_better(found):
-        return found.parameters_alone(), None
     if unseen is None or unseen.gain >= WORSE:
+        lasting = any(step.law.only is None for step in found.steps)
+        if unseen is not None and unseen.ratio and lasting and not predicts_better(found):
+            return found.parameters_alone(), None
         return found, unseen
     shorter = held_out_in_short_windows(found)
     if shorter is not None and shorter.ratio > KEPT_RATIO:

@@ -77,13 +77,9 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import Experiment
-from rsea_core.identify.multistep.horizons import (
-    likelier,
-    parameters_with_timing,
-    with_fine_steps,
-)
+from rsea_core.identify.multistep.horizons import likelier, with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER, nuisances
-from rsea_core.identify.multistep.mean_commands import with_mean_commands
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing, with_mean_commands
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case
 

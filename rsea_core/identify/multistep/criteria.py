@@ -15,6 +15,7 @@ APPLIED_CURRENT = (
     3.0  # of the sensor's noise: larger errors beside the commands are another current
 )
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
+UNLIKELY_TIMING = 500.0  # units behind: a timing with which no horizons are grown
 TIMING_DOUBT = 10.0  # units: a difference that does not tell a linear command from a held one
 TIMING_SHARE = 0.1  # of the least law's gain, that another timing must gain for a new search
 LEAST_GAIN = 8.0  # of a law

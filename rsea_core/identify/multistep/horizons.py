@@ -14,18 +14,10 @@ from numpy.typing import NDArray
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.coloured_noise import with_coloured_readings
-from rsea_core.identify.multistep.command_timing import (
-    AS_LOGGED,
-    CommandTiming,
-    RowTimes,
-    timings,
-)
 from rsea_core.identify.multistep.criteria import (
     DELAY_FIT,
     DELAYS,
     DELAYS_FITTED,
-    DOUBTED_ERROR,
-    DOUBTED_SHARE,
     FINE_STEPS,
     FIRST_STEPS,
     HORIZONS,
@@ -58,7 +50,6 @@ from rsea_core.identify.multistep.tracks import (
     resmoothed,
     windows_of,
 )
-from rsea_core.recordings.case import Case
 
 
 def with_windows(estimator: Estimator, horizon: float | None) -> list[Track]:
@@ -160,10 +151,10 @@ def parameters(
     x[at] = growth[1].x[at]
     again, _ = _grown(problem, h, x, say, output_errors)
     lost = relative_error(growth[0], h, growth[1].x) > LOST
-    return again if lost else _best_of(growth, again)
+    return again if lost else best_of(growth, again)
 
 
-def _best_of(*ends: Growth) -> Growth:
+def best_of(*ends: Growth) -> Growth:
     """The likeliest of those that are predictable for longest."""
     longest = max(_length(horizon) for *_, horizon in ends)
     ends = [end for end in ends if _length(end[2]) == longest]
@@ -317,79 +308,3 @@ def with_problem(estimator: Estimator, problem: MultistepProblem) -> Estimator:
         for t, e in zip(estimator.tracks, problem.fitted, strict=True)
     ]
     return Estimator(problem, tracks, tempering=estimator.tempering, cache=estimator.cache)
-
-
-def parameters_with_timing(
-    case: Case, h: Hypothesis, say, *, timing: CommandTiming | None = None, quick: bool = False
-) -> Growth:
-    """The parameters, and when commands act: held or linear between rows, at the stamps or not.
-
-    A timing that is given is not judged. Where parameters leave dependent innovations, the fit may
-    have ended in a wrong place, from which another timing cannot be judged either: the horizons are
-    grown again with output errors, once with each.
-    """
-    first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
-    if quick or not _in_doubt(first):
-        if timing is not None:
-            return first
-        better = (*with_better_timing(*first[:2], case, say), first[2])
-        timing = better[0].problem.timing
-        if timing == AS_LOGGED:
-            return better
-        problem = MultistepProblem(case, timing=timing, steps=better[0].problem.steps)
-        first = parameters(problem, h, say)  # grown with this timing
-        first = _best_of(better, first)
-        first = (*with_better_timing(*first[:2], case, say), first[2])  # with the new values
-        if quick or not _in_doubt(first):
-            return first
-    say("the fit may be in a wrong place: grown again from output errors")
-    steps, ends = first[0].problem.steps, [first]
-    for each in (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,):
-        problem = MultistepProblem(case, timing=each, steps=steps)
-        ends.append(parameters(problem, h, say, output_errors=True))
-    return _best_of(*ends)
-
-
-def _in_doubt(growth: Growth) -> bool:
-    """Whether unknown torques may explain what other values would."""
-    estimator, fit, _ = growth
-    error = relative_error(estimator, fit.hypothesis, fit.x)
-    return estimator.tempering < DOUBTED_SHARE or error > DOUBTED_ERROR
-
-
-def with_better_timing(estimator, base, case, say) -> tuple[Estimator, Estimate]:
-    """The timing of the commands that makes the readings likeliest, if another one is better."""
-    tried = {estimator.problem.timing}
-    for _ in range(len(RowTimes) + 1):
-        others = [t for t in timings(case, estimator.problem.timing) if t not in tried]
-        if not others:
-            break
-        tried.add(others[0])
-        estimator, base = _better_timing(estimator, base, case, others[0], say)
-    return estimator, base
-
-
-def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estimate]:
-    """The likelier of two timings, each with the noise that it needs.
-
-    That of the file contract stands unless another one is likelier by `LINEAR_GAIN`.
-    """
-    least = -LINEAR_GAIN if timing == AS_LOGGED else LINEAR_GAIN
-    h, steps = base.hypothesis, estimator.problem.steps
-    other = with_problem(estimator, MultistepProblem(case, timing=timing, steps=steps))
-    fit = with_best_delay(other, h, base.x)
-    better = fit.cost < base.cost - least
-    if not better and fit.cost < base.cost + 50.0:
-        other = with_noise(other, h, fit.x)
-        fit = other.fit(h, fit.x)
-        better = fit.cost < base.cost - least
-    hold = "linear" if timing.linear else "held"
-    gain = base.cost - fit.cost
-    say(f"command {hold}, stamps are times of {timing.rows}: {gain:.1f} units likelier")
-    if not better:
-        return estimator, base
-    other = with_noise(other, h, fit.x)
-    fit = other.fit(h, fit.x)
-    smooth(other, h, fit.x)
-    other = with_noise(other.having([prepared(t) for t in other.tracks]), h, fit.x)
-    return other, other.fit(h, fit.x)

@@ -174,9 +174,13 @@ class WholeSearch(TakenLaws):
 
         Alone, a law also follows the error of another one that is missing: a winding is hotter than
         any insulation allows where friction is not known yet. None where there is no such law,
-        where the search leaves no less than this one, or where a law stays at a bound.
+        where it explains too little, where the search leaves no less than this one, or where a law
+        stays at a bound.
         """
         if self.best_at_bound is None or self.left() <= self.enough:
+            return None
+        unexplained = excess(self.own, self.plain.hypothesis, self.plain.x)
+        if self.best_at_bound.gain < NEARLY_EXPLAINED * unexplained:
             return None
         other = WholeSearch(self.own, self.plain, self.found, self.laws, self.enough)
         first = self.continued(self.best_at_bound)

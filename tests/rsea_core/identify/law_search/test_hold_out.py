@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.drive_thermal import DriveThermal
+from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.hold_out import (
     beyond_chance,
     held_out,
     part_of,
+    predicts_better,
     with_pause_shown,
     with_shared_recordings,
 )
@@ -116,3 +118,20 @@ def test_a_law_whose_axis_stops_at_other_detents_is_refuted_only_if_short_window
     assert end.steps
     assert (unseen.gain > 0.0) == kept
     assert (unseen.ratio > KEPT_RATIO) == kept
+
+
+@pytest.mark.parametrize(("factor", "better"), [(1.0, True), (-2.0, False), (5.0, False)])
+def test_a_law_predicts_better_if_errors_of_recordings_held_out_are_smaller(
+    tmp_path, factor, better
+):
+    friction = LoadFriction(coulomb_Nm=0.06)
+    fitted = (axis_recording(friction, seed=seed) for seed in (3, 4))
+    held = axis_recording(friction, seed=5, role="validation")
+    found = begun(axis_case(tmp_path, *fitted, held, rig=axis_rig()), None, lambda text: None)
+    laws = [law for law in laws_of(found) if law.key == "load-friction/coulomb"]
+    add_all(found, laws, lambda text: None)
+    assert beyond_chance(found)[0].steps
+    x = found.best.x.copy()
+    x[-1] *= factor
+    found.best = replace(found.best, x=x)
+    assert predicts_better(found) is better

@@ -11,8 +11,8 @@ from rsea_core.identify.law_search import richer_laws
 from rsea_core.identify.law_search.candidate_fits import fitted, settled
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import PER_VALUE
-from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from tests.cases.one_axis import pendulum_case
 
 

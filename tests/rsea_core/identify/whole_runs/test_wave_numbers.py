@@ -13,8 +13,8 @@ from rsea_core.identify.law_search.candidate_fits import fitted
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.screening import Projection, screen, screen_again
 from rsea_core.identify.law_search.search import laws_of
-from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from rsea_core.identify.whole_runs.forms import alike, holds
 from rsea_core.identify.whole_runs.search import WholeSearch
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit

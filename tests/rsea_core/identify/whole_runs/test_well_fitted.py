@@ -8,8 +8,8 @@ import pytest
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from rsea_core.identify.whole_runs.sensor_noise import (
     converged,
     in_sensor_noise,

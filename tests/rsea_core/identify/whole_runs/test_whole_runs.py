@@ -13,8 +13,9 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.screening import Candidate, screen
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.criteria import COMPLETE, SOUND
-from rsea_core.identify.multistep.horizons import parameters_with_timing, with_fine_steps
+from rsea_core.identify.multistep.horizons import with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
 from rsea_core.identify.whole_runs.search import worth

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-import rsea_core.identify.multistep.mean_commands as mean_commands
+import rsea_core.identify.multistep.timing_choice as timing_choice
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.command_timing import CommandTiming
-from rsea_core.identify.multistep.horizons import parameters_with_timing
 from rsea_core.identify.multistep.log_nuisances import nuisances
-from rsea_core.identify.multistep.mean_commands import with_mean_commands
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing, with_mean_commands
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 
@@ -34,16 +33,16 @@ def test_a_short_recording_keeps_parts_of_rows(fitted):
 
 def test_a_long_recording_has_undivided_rows_that_predict_alike(fitted, monkeypatch):
     estimator, base = fitted
-    monkeypatch.setattr(mean_commands, "LONG_ROWS", 1000)
-    monkeypatch.setattr(mean_commands, "LOST_IN_NOISE", 0.6)  # rows are a 50th of a cycle here
+    monkeypatch.setattr(timing_choice, "LONG_ROWS", 1000)
+    monkeypatch.setattr(timing_choice, "LOST_IN_NOISE", 0.6)  # rows are a 50th of a cycle here
     other = with_mean_commands(estimator, base)
     assert rows_cut(other) == [1]
     before, after = (e.innovations([(base.hypothesis, base.x)])[0] for e in (estimator, other))
-    assert 0.0 < np.sqrt(np.mean((before - after) ** 2)) < mean_commands.LOST_IN_NOISE
+    assert 0.0 < np.sqrt(np.mean((before - after) ** 2)) < timing_choice.LOST_IN_NOISE
 
 
 def test_rows_whose_innovations_change_keep_their_parts(fitted, monkeypatch):
     estimator, base = fitted
-    monkeypatch.setattr(mean_commands, "LONG_ROWS", 1000)
-    monkeypatch.setattr(mean_commands, "LOST_IN_NOISE", 1e-6)
+    monkeypatch.setattr(timing_choice, "LONG_ROWS", 1000)
+    monkeypatch.setattr(timing_choice, "LOST_IN_NOISE", 1e-6)
     assert with_mean_commands(estimator, base) is estimator

@@ -1,0 +1,145 @@
+"""Which timing of the commands a search takes, and mean commands in long recordings.
+
+Held or linear commands, at the stamps of the rows or at even times, are compared by what each makes
+of the readings (docs/diagnosis.md 10.2). A command that moves linearly from row to row is simulated
+in `FINER` parts of each row, which multiplies the steps: where a cycle of the machine has thousands
+of rows (EMPS: 5900), the mean over each row is accurate enough.
+"""
+
+import numpy as np
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.command_timing import (
+    AS_LOGGED,
+    CommandTiming,
+    RowTimes,
+    timings,
+)
+from rsea_core.identify.multistep.criteria import (
+    DOUBTED_ERROR,
+    DOUBTED_SHARE,
+    LINEAR_GAIN,
+    LONG_ROWS,
+    LOST_IN_NOISE,
+    UNLIKELY_TIMING,
+)
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.horizons import (
+    Growth,
+    best_of,
+    in_steps,
+    parameters,
+    relative_error,
+    smooth,
+    with_best_delay,
+    with_noise,
+    with_problem,
+)
+from rsea_core.identify.multistep.tracks import prepared
+from rsea_core.recordings.case import Case
+
+
+def parameters_with_timing(
+    case: Case, h: Hypothesis, say, *, timing: CommandTiming | None = None, quick: bool = False
+) -> Growth:
+    """The parameters, and when commands act: held or linear between rows, at the stamps or not.
+
+    A timing that is given is not judged. Where parameters leave dependent innovations, the fit may
+    have ended in a wrong place, from which another timing cannot be judged either: the horizons are
+    grown again with output errors, once with each.
+    """
+    first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
+    if quick or not _in_doubt(first):
+        if timing is not None:
+            return first
+        better = (*with_better_timing(*first[:2], case, say), first[2])
+        timing = better[0].problem.timing
+        if timing == AS_LOGGED:
+            return better
+        problem = MultistepProblem(case, timing=timing, steps=better[0].problem.steps)
+        first = parameters(problem, h, say)  # grown with this timing
+        first = best_of(better, first)
+        first = (*with_better_timing(*first[:2], case, say), first[2])  # with the new values
+        if quick or not _in_doubt(first):
+            return first
+    say("the fit may be in a wrong place: grown again from output errors")
+    steps, ends = first[0].problem.steps, [first]
+    for each in (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,):
+        problem = MultistepProblem(case, timing=each, steps=steps)
+        if len(ends) > 1 and _behind(ends[1], problem) > UNLIKELY_TIMING:
+            continue
+        ends.append(parameters(problem, h, say, output_errors=True))
+    return best_of(*ends)
+
+
+def _behind(growth: Growth, problem: MultistepProblem) -> float:
+    """Units by which another timing's problem is less likely where a growth ended, refitted."""
+    estimator, fit, _ = growth
+    h = fit.hypothesis
+    other = with_problem(estimator, problem)
+    other = with_noise(other, h, with_best_delay(other, h, fit.x).x)
+    return other.fit(h, fit.x).cost - fit.cost
+
+
+def _in_doubt(growth: Growth) -> bool:
+    """Whether unknown torques may explain what other values would."""
+    estimator, fit, _ = growth
+    error = relative_error(estimator, fit.hypothesis, fit.x)
+    return estimator.tempering < DOUBTED_SHARE or error > DOUBTED_ERROR
+
+
+def with_better_timing(estimator, base, case, say) -> tuple[Estimator, Estimate]:
+    """The timing of the commands that makes the readings likeliest, if another one is better."""
+    tried = {estimator.problem.timing}
+    for _ in range(len(RowTimes) + 1):
+        others = [t for t in timings(case, estimator.problem.timing) if t not in tried]
+        if not others:
+            break
+        tried.add(others[0])
+        estimator, base = _better_timing(estimator, base, case, others[0], say)
+    return estimator, base
+
+
+def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estimate]:
+    """The likelier of two timings, each with the noise that it needs.
+
+    That of the file contract stands unless another one is likelier by `LINEAR_GAIN`.
+    """
+    least = -LINEAR_GAIN if timing == AS_LOGGED else LINEAR_GAIN
+    h, steps = base.hypothesis, estimator.problem.steps
+    other = with_problem(estimator, MultistepProblem(case, timing=timing, steps=steps))
+    fit = with_best_delay(other, h, base.x)
+    better = fit.cost < base.cost - least
+    if not better and fit.cost < base.cost + 50.0:
+        other = with_noise(other, h, fit.x)
+        fit = other.fit(h, fit.x)
+        better = fit.cost < base.cost - least
+    hold = "linear" if timing.linear else "held"
+    gain = base.cost - fit.cost
+    say(f"command {hold}, stamps are times of {timing.rows}: {gain:.1f} units likelier")
+    if not better:
+        return estimator, base
+    other = with_noise(other, h, fit.x)
+    fit = other.fit(h, fit.x)
+    smooth(other, h, fit.x)
+    other = with_noise(other.having([prepared(t) for t in other.tracks]), h, fit.x)
+    return other, other.fit(h, fit.x)
+
+
+def with_mean_commands(estimator: Estimator, base: Estimate) -> Estimator:
+    """The estimator with undivided rows, if a recording is long and innovations hardly change.
+
+    Short recordings keep the parts of rows: they cost little, and a complete model of a machine
+    with a fine encoder would show the difference in whole recordings.
+    """
+    problem, trials = estimator.problem, [(base.hypothesis, base.x)]
+    long = max(t.experiment.rows for t in estimator.tracks) > LONG_ROWS
+    if not (long and problem.timing.linear):
+        return estimator
+    other = in_steps(estimator, problem.steps._replace(parts_of_row=1))
+    for before, after in zip(estimator.innovations(trials), other.innovations(trials), strict=True):
+        moved = np.sqrt(np.mean((before - after) ** 2, axis=(0, 1)))
+        if not np.all(moved < LOST_IN_NOISE):
+            return estimator
+    return other
