@@ -129,7 +129,7 @@ class WindowVerdict(Conclusion):
         if self.found.steps:
             first = len(self.fit.hypothesis.laws) - len(self.found.steps)
             there = step_presence(self.found, 0, self.held_out) >= 0.5
-            there = there and shown(self._figures(first))
+            there = there and self._shown(first)
             if there or self.delayed is not None:
                 return "missing-physics"
             much = any(_gains_much(step) for step in self.found.steps)
@@ -139,6 +139,9 @@ class WindowVerdict(Conclusion):
         if self.dependent:
             return "unexplained"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
+
+    def _shown(self, j: int) -> bool:
+        return shown(self._figures(j), self.fit.hypothesis.laws[j].unknowns)
 
     def _rig_is_right(self) -> bool:
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
@@ -177,7 +180,7 @@ class WindowVerdict(Conclusion):
         first = len(self.fit.hypothesis.laws) - len(self.found.steps)
         for number, step in enumerate(self.found.steps):
             confidence, figures = self.step_confidence(number), self._figures(first + number)
-            if self.verdict == "unexplained" or not shown(figures):
+            if self.verdict == "unexplained" or not self._shown(first + number):
                 confidence = min(confidence, UNCLAIMED)
             scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
             alike = [w.effect for w, g in rivals_of(step.law, step.rivals) if step.gain - g < scale]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.load_unbalance import LoadUnbalance
-from rsea_core.effects.variant import AT_ONE
+from rsea_core.effects.variant import AT_ONE, Unknown
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, between_laws
@@ -73,13 +73,20 @@ def _at_bound(problem: Problem, fit: Fit) -> NDArray:
     return (fit.x >= high - 1e-9) | ((fit.x <= low + 1e-9) & (low != 0.0))
 
 
-def shown(figures: Mapping[str, dict]) -> bool:
+def shown(figures: Mapping[str, dict], unknowns: Sequence[Unknown] = ()) -> bool:
     """Whether a law's figures (of `figures_with_std`) tell it from none.
+
+    Its gain alone does where all its unknowns are fitted by their logarithms: no such size is ever
+    zero (a ratio may be one), and a wide interval says by which factor it may be off (slips of a hysteresis trade
+    stiffness among each other), not that it may be absent.
 
     Innovations of a law that is all but right are not white: a further one can gain hundreds of
     log-likelihood units there, by a size that the scatter between blocks and recordings does not
     tell from none.
     """
+    free = [u for u in unknowns if u.scale > 0.0]
+    if free and all(u.log and u.name not in AT_ONE for u in free):
+        return True
     known = [(n, f) for n, f in figures.items() if f["std"]]
     sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
     return not sizes or any(size >= SHOWN_STD * std for size, std in sizes)

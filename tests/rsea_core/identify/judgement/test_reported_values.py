@@ -2,6 +2,7 @@
 
 import pytest
 
+from rsea_core.effects.variant import Unknown
 from rsea_core.identify.judgement.reported_values import shown
 
 
@@ -24,3 +25,15 @@ from rsea_core.identify.judgement.reported_values import shown
 def test_a_figure_two_deviations_from_none_shows_an_effect(figures, expected):
     entries = {name: {"value": value, "std": std} for name, (value, std) in figures.items()}
     assert shown(entries) is expected
+
+
+def test_a_size_that_is_fitted_by_its_logarithm_is_never_absent():
+    figures = {"loop_width_Nm": {"value": 0.039, "std": 0.031}}
+    log = Unknown(name="stiffness_1_Nm_per_rad", unit="Nm/rad", low=1e-3, high=10.0, scale=0.1,
+                  log=True)  # fmt: skip
+    offset = Unknown(name="offset", unit="Nm", low=-1.0, high=1.0, scale=0.1)
+    assert not shown(figures)
+    assert shown(figures, (log,))
+    assert not shown(figures, (log, offset))
+    ratio = Unknown(name="scale", unit="-", low=0.05, high=20.0, scale=0.01, log=True)
+    assert not shown({"scale": {"value": 1.004, "std": 0.005}}, (ratio,))
