@@ -12,7 +12,7 @@ from rsea_core.identify.candidates.catalogue import of_one_body, rivals_of
 from rsea_core.identify.candidates.rig_parameters import place_of
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
-from rsea_core.identify.judgement.reported_values import shown
+from rsea_core.identify.judgement.reported_values import shown, sizes_with_std
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
@@ -141,7 +141,9 @@ class WindowVerdict(Conclusion):
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
 
     def _shown(self, j: int) -> bool:
-        return shown(self._figures(j), self.fit.hypothesis.laws[j].unknowns)
+        law, first = self.fit.hypothesis.laws[j], self.index_of(j)
+        own = slice(first, first + sum(u.scale > 0.0 for u in law.unknowns))
+        return shown(self._figures(j), sizes_with_std(law, self.fit.x[own], self.spread.std[own]))
 
     def _rig_is_right(self) -> bool:
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.load_unbalance import LoadUnbalance
-from rsea_core.effects.variant import AT_ONE, Unknown
+from rsea_core.effects.variant import AT_ONE, FROM_ZERO, Law
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.covariance import LAW_SPREAD, Spread, between_laws
@@ -73,23 +73,41 @@ def _at_bound(problem: Problem, fit: Fit) -> NDArray:
     return (fit.x >= high - 1e-9) | ((fit.x <= low + 1e-9) & (low != 0.0))
 
 
-def shown(figures: Mapping[str, dict], unknowns: Sequence[Unknown] = ()) -> bool:
-    """Whether a law's figures (of `figures_with_std`) tell it from none.
-
-    Its gain alone does where all its unknowns are fitted by their logarithms: no such size is ever
-    zero (a ratio may be one), and a wide interval says by which factor it may be off (slips of a hysteresis trade
-    stiffness among each other), not that it may be absent.
+def shown(figures: Mapping[str, dict], sizes: Sequence[tuple[float, float]] = ()) -> bool:
+    """Whether a law's figures (of `figures_with_std`) or sizes tell it from none.
 
     Innovations of a law that is all but right are not white: a further one can gain hundreds of
     log-likelihood units there, by a size that the scatter between blocks and recordings does not
     tell from none.
+
+    Parameters
+    ----------
+    sizes : sequence of (distance from none, standard deviation)
+        Of numbers in proportion to which the law acts: a figure may depend on others as well (the
+        width of a loop on the yield of a slip that never slides).
     """
-    free = [u for u in unknowns if u.scale > 0.0]
-    if free and all(u.log and u.name not in AT_ONE for u in free):
-        return True
     known = [(n, f) for n, f in figures.items() if f["std"]]
-    sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
-    return not sizes or any(size >= SHOWN_STD * std for size, std in sizes)
+    pairs = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
+    pairs += [pair for pair in sizes if pair[1] > 0.0]
+    return not pairs or any(size >= SHOWN_STD * std for size, std in pairs)
+
+
+def sizes_with_std(law: Law, x: NDArray, std: NDArray) -> list[tuple[float, float]]:
+    """Distance from none and deviation of each number in proportion to which a law acts.
+
+    Parameters
+    ----------
+    x, std : (k,) arrays
+        Of the law's free unknowns.
+    """
+    free = [u for u in law.unknowns if u.scale > 0.0]
+    found = []
+    for u, value, unsure in zip(free, x, std, strict=True):
+        if u.name in AT_ONE:
+            found.append((abs(value - (0.0 if u.log else 1.0 / u.scale)), unsure))
+        elif u.name in FROM_ZERO and not u.log:  # a logarithm never reaches zero
+            found.append((abs(value), unsure))
+    return found
 
 
 def _derivatives(

@@ -1,9 +1,10 @@
 """An effect is not claimed where no figure of it differs from that of a machine without it."""
 
+import numpy as np
 import pytest
 
-from rsea_core.effects.variant import Unknown
-from rsea_core.identify.judgement.reported_values import shown
+from rsea_core.effects.variant import Law, Unknown
+from rsea_core.identify.judgement.reported_values import shown, sizes_with_std
 
 
 @pytest.mark.parametrize(
@@ -27,13 +28,33 @@ def test_a_figure_two_deviations_from_none_shows_an_effect(figures, expected):
     assert shown(entries) is expected
 
 
-def test_a_size_that_is_fitted_by_its_logarithm_is_never_absent():
+def law_of(*unknowns: Unknown) -> Law:
+    return Law(effect="e", law="l", subsystem="drive", kind=None, write=lambda *_: None,
+               unknowns=unknowns, starts=())  # fmt: skip
+
+
+def unknown(name: str, scale: float, *, log: bool = False) -> Unknown:
+    return Unknown(name=name, unit="", low=0.01, high=100.0, scale=scale, log=log)
+
+
+def test_a_size_two_deviations_from_none_shows_a_law_whose_figure_is_unsure():
+    slip = law_of(unknown("stiffness_1_Nm_per_rad", 0.01), unknown("yield_1_rad", 0.2, log=True))
     figures = {"loop_width_Nm": {"value": 0.039, "std": 0.031}}
-    log = Unknown(name="stiffness_1_Nm_per_rad", unit="Nm/rad", low=1e-3, high=10.0, scale=0.1,
-                  log=True)  # fmt: skip
-    offset = Unknown(name="offset", unit="Nm", low=-1.0, high=1.0, scale=0.1)
+    sure = sizes_with_std(slip, np.array([86.0, -28.0]), np.array([6.6, 6.7]))
+    assert sure == [(86.0, 6.6)]  # a yield is no size
+    assert shown(figures, sure)
+    assert not shown(figures, sizes_with_std(slip, np.array([9.0, -28.0]), np.array([6.6, 6.7])))
     assert not shown(figures)
-    assert shown(figures, (log,))
-    assert not shown(figures, (log, offset))
-    ratio = Unknown(name="scale", unit="-", low=0.05, high=20.0, scale=0.01, log=True)
-    assert not shown({"scale": {"value": 1.004, "std": 0.005}}, (ratio,))
+
+
+@pytest.mark.parametrize(("log", "none"), [(True, 0.0), (False, 100.0)])
+def test_none_of_a_ratio_is_one(log, none):
+    ratio = law_of(unknown("scale", 0.01, log=log))
+    ((distance, std),) = sizes_with_std(ratio, np.array([none + 3.0]), np.array([1.0]))
+    assert (distance, std) == (pytest.approx(3.0), 1.0)
+
+
+def test_a_logarithm_of_a_size_is_never_that_of_none():
+    assert (
+        sizes_with_std(law_of(unknown("coulomb_Nm", 0.1, log=True)), np.ones(1), np.ones(1)) == []
+    )
