@@ -12,7 +12,7 @@ from rsea_core.identify.candidates.catalogue import of_one_body, rivals_of
 from rsea_core.identify.candidates.rig_parameters import place_of
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
-from rsea_core.identify.judgement.reported_values import shown, sizes_with_std
+from rsea_core.identify.judgement.reported_values import shown, sizes_shown
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
@@ -128,8 +128,7 @@ class WindowVerdict(Conclusion):
             return "unexplained"
         if self.found.steps:
             first = len(self.fit.hypothesis.laws) - len(self.found.steps)
-            there = step_presence(self.found, 0, self.held_out) >= 0.5
-            there = there and self._shown(first)
+            there = step_presence(self.found, 0, self.held_out) >= 0.5 and self._shown(first)
             if there or self.delayed is not None:
                 return "missing-physics"
             much = any(_gains_much(step) for step in self.found.steps)
@@ -142,8 +141,7 @@ class WindowVerdict(Conclusion):
 
     def _shown(self, j: int) -> bool:
         law, first = self.fit.hypothesis.laws[j], self.index_of(j)
-        own = slice(first, first + sum(u.scale > 0.0 for u in law.unknowns))
-        return shown(self._figures(j), sizes_with_std(law, self.fit.x[own], self.spread.std[own]))
+        return shown(self._figures(j)) or sizes_shown(law, first, self.fit.x, self.spread)
 
     def _rig_is_right(self) -> bool:
         return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))

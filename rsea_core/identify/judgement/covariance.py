@@ -25,6 +25,7 @@ BLOCK_s = 0.5
 PIECES = 5  # of each recording
 NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
 LAW_SPREAD = 0.015  # of what a law does: what laws of one effect by different hands differ by
+LEAST_SQUARE = 1e-9  # of the largest variance: less is round-off
 ALONE = 4.0  # growth of a variance without one recording, above which that recording is needed
 
 
@@ -60,6 +61,19 @@ class Spread:
             changes = [figure(x + sign * move) - here for move in moves for sign in (1.0, -1.0)]
             found.append(0.5 * float(np.sum(np.square(changes))))
         return max(found)
+
+    def squared_distance(self, at: Sequence[int], apart: NDArray) -> float:
+        """Least square of a distance (k,) of some unknowns, in the covariance of each source.
+
+        A source without any variance there says nothing.
+        """
+        found = []
+        for C in self.sources:
+            squares, axes = np.linalg.eigh(C[np.ix_(at, at)])
+            if squares[-1] > 0.0:
+                squares = np.maximum(squares, LEAST_SQUARE * squares[-1])
+                found.append(float(np.sum((axes.T @ apart) ** 2 / squares)))
+        return min(found, default=0.0)
 
     @property
     def std(self) -> NDArray:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri, erfc
 
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.load_unbalance import LoadUnbalance
@@ -73,41 +74,40 @@ def _at_bound(problem: Problem, fit: Fit) -> NDArray:
     return (fit.x >= high - 1e-9) | ((fit.x <= low + 1e-9) & (low != 0.0))
 
 
-def shown(figures: Mapping[str, dict], sizes: Sequence[tuple[float, float]] = ()) -> bool:
-    """Whether a law's figures (of `figures_with_std`) or sizes tell it from none.
+def shown(figures: Mapping[str, dict]) -> bool:
+    """Whether a law's figures (of `figures_with_std`) tell it from none.
 
     Innovations of a law that is all but right are not white: a further one can gain hundreds of
     log-likelihood units there, by a size that the scatter between blocks and recordings does not
     tell from none.
-
-    Parameters
-    ----------
-    sizes : sequence of (distance from none, standard deviation)
-        Of numbers in proportion to which the law acts: a figure may depend on others as well (the
-        width of a loop on the yield of a slip that never slides).
     """
     known = [(n, f) for n, f in figures.items() if f["std"]]
-    pairs = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
-    pairs += [pair for pair in sizes if pair[1] > 0.0]
-    return not pairs or any(size >= SHOWN_STD * std for size, std in pairs)
+    sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
+    return not sizes or any(size >= SHOWN_STD * std for size, std in sizes)
 
 
-def sizes_with_std(law: Law, x: NDArray, std: NDArray) -> list[tuple[float, float]]:
-    """Distance from none and deviation of each number in proportion to which a law acts.
+def sizes_shown(law: Law, first: int, x: NDArray, spread: Spread) -> bool:
+    """Whether the sizes in proportion to which a law acts, taken together, differ from none.
+
+    A figure may depend on other unknowns as well (the width of a loop on the yield of a slip that
+    never slides), and two sizes may be known together only (both efficiencies of a gear). The
+    squared distance in the spread's covariance has a chi-squared distribution; its limit is that of
+    `SHOWN_STD` deviations of one size.
 
     Parameters
     ----------
-    x, std : (k,) arrays
-        Of the law's free unknowns.
+    first : int
+        Index of the law's first unknown in x (n,).
     """
-    free = [u for u in law.unknowns if u.scale > 0.0]
-    found = []
-    for u, value, unsure in zip(free, x, std, strict=True):
-        if u.name in AT_ONE:
-            found.append((abs(value - (0.0 if u.log else 1.0 / u.scale)), unsure))
-        elif u.name in FROM_ZERO and not u.log:  # a logarithm never reaches zero
-            found.append((abs(value), unsure))
-    return found
+    at, apart = [], []
+    for j, u in enumerate((u for u in law.unknowns if u.scale > 0.0), start=first):
+        none = 1.0 / u.scale if u.name in AT_ONE and not u.log else 0.0
+        # the logarithm of a size never reaches none; that of a ratio does
+        if u.name in AT_ONE or (u.name in FROM_ZERO and not u.log):
+            at.append(j)
+            apart.append(x[j] - none)
+    limit = chdtri(len(at), erfc(SHOWN_STD / np.sqrt(2.0))) if at else np.inf
+    return bool(at) and spread.squared_distance(at, np.array(apart)) >= limit
 
 
 def _derivatives(

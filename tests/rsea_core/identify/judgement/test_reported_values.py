@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.variant import Law, Unknown
-from rsea_core.identify.judgement.reported_values import shown, sizes_with_std
+from rsea_core.identify.judgement.covariance import Spread
+from rsea_core.identify.judgement.reported_values import shown, sizes_shown
 
 
 @pytest.mark.parametrize(
@@ -37,24 +38,35 @@ def unknown(name: str, scale: float, *, log: bool = False) -> Unknown:
     return Unknown(name=name, unit="", low=0.01, high=100.0, scale=scale, log=log)
 
 
+def in_spread(law: Law, x, covariance, *others) -> bool:
+    spread = Spread(sources=tuple(np.array(C, float) for C in (covariance, *others)))
+    return sizes_shown(law, 0, np.array(x, float), spread)
+
+
 def test_a_size_two_deviations_from_none_shows_a_law_whose_figure_is_unsure():
     slip = law_of(unknown("stiffness_1_Nm_per_rad", 0.01), unknown("yield_1_rad", 0.2, log=True))
-    figures = {"loop_width_Nm": {"value": 0.039, "std": 0.031}}
-    sure = sizes_with_std(slip, np.array([86.0, -28.0]), np.array([6.6, 6.7]))
-    assert sure == [(86.0, 6.6)]  # a yield is no size
-    assert shown(figures, sure)
-    assert not shown(figures, sizes_with_std(slip, np.array([9.0, -28.0]), np.array([6.6, 6.7])))
-    assert not shown(figures)
+    covariance = np.diag([6.6**2, 6.7**2])
+    assert in_spread(slip, [86.0, -28.0], covariance)
+    assert in_spread(slip, [13.3, -28.0], covariance)
+    assert not in_spread(slip, [13.1, -28.0], covariance)  # a yield is no size
+    assert not in_spread(slip, [86.0, -28.0], covariance, np.diag([50.0**2, 6.7**2]))
+    assert in_spread(slip, [86.0, -28.0], covariance, np.zeros((2, 2)))  # one recording alone
+
+
+def test_sizes_that_are_known_together_only_show_a_law():
+    gear = law_of(unknown("drive_efficiency", 0.01), unknown("backdrive_efficiency", 0.01))
+    apart = [100.0 - 1.5, 100.0 - 1.5]
+    assert not in_spread(gear, apart, [[1.0, 0.0], [0.0, 1.0]])  # 4.5, the limit is 6.2
+    assert in_spread(gear, apart, [[1.0, -0.9], [-0.9, 1.0]])
+    assert not in_spread(gear, apart, [[1.0, 0.9], [0.9, 1.0]])
 
 
 @pytest.mark.parametrize(("log", "none"), [(True, 0.0), (False, 100.0)])
 def test_none_of_a_ratio_is_one(log, none):
     ratio = law_of(unknown("scale", 0.01, log=log))
-    ((distance, std),) = sizes_with_std(ratio, np.array([none + 3.0]), np.array([1.0]))
-    assert (distance, std) == (pytest.approx(3.0), 1.0)
+    assert in_spread(ratio, [none + 2.1], [[1.0]])
+    assert not in_spread(ratio, [none + 1.9], [[1.0]])
 
 
-def test_a_logarithm_of_a_size_is_never_that_of_none():
-    assert (
-        sizes_with_std(law_of(unknown("coulomb_Nm", 0.1, log=True)), np.ones(1), np.ones(1)) == []
-    )
+def test_a_law_without_sizes_is_shown_by_its_figures_alone():
+    assert not in_spread(law_of(unknown("coulomb_Nm", 0.1, log=True)), [9.0], [[1.0]])
