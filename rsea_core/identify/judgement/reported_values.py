@@ -92,13 +92,16 @@ def sizes_shown(law: Law, first: int, x: NDArray, spread: Spread) -> bool:
     A figure may depend on other unknowns as well (the width of a loop on the yield of a slip that
     never slides), and two sizes may be known together only (both efficiencies of a gear). The
     squared distance in the spread's covariance has a chi-squared distribution; its limit is that of
-    `SHOWN_STD` deviations of one size.
+    `SHOWN_STD` deviations of one size. False of an unbalance: how far the rig's mass may be off is
+    in the variance of its figure, not in that of its sizes.
 
     Parameters
     ----------
     first : int
         Index of the law's first unknown in x (n,).
     """
+    if law.effect == LoadUnbalance.effect:
+        return False
     at, apart = [], []
     for j, u in enumerate((u for u in law.unknowns if u.scale > 0.0), start=first):
         none = 1.0 / u.scale if u.name in AT_ONE and not u.log else 0.0

@@ -1,5 +1,7 @@
 """An effect is not claimed where no figure of it differs from that of a machine without it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -70,3 +72,8 @@ def test_none_of_a_ratio_is_one(log, none):
 
 def test_a_law_without_sizes_is_shown_by_its_figures_alone():
     assert not in_spread(law_of(unknown("coulomb_Nm", 0.1, log=True)), [9.0], [[1.0]])
+
+
+def test_sizes_of_an_unbalance_do_not_say_how_far_the_mass_of_the_rig_file_is_off():
+    unbalance = replace(law_of(unknown("sin_Nm", 0.01)), effect="load-unbalance")
+    assert not in_spread(unbalance, [9.0], [[1.0]])
