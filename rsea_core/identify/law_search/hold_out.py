@@ -31,11 +31,18 @@ from rsea_core.identify.multistep.criteria import (
     UNEVEN_GAIN,
     WORSE,
 )
+from rsea_core.identify.multistep.criteria import LEAST_ROWS as LEAST_ROWS_OF_WINDOW
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import LEAST_ROWS, Experiment
 from rsea_core.identify.multistep.horizons import smooth, with_windows
 from rsea_core.identify.multistep.kalman_filter import huber_squares
-from rsea_core.identify.multistep.tracks import Track, initial_track, prepared, windows_of
+from rsea_core.identify.multistep.tracks import (
+    Track,
+    initial_track,
+    prepared,
+    scale_of,
+    windows_of,
+)
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
@@ -157,26 +164,39 @@ def beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
 def predicts_better(found: Found) -> bool:
     """Whether laws predict any reading of recordings held out better than parameters alone do.
 
-    In windows from one time scale to the longest in which the machine is predictable. Better are
-    root mean square errors lower by `LESS_ERROR`, if differences of windows' squared errors have a
-    mean beyond `ERRORS_BEYOND` of its standard errors; of fewer than three windows, errors half as
-    large.
+    In windows from one time scale to the longest in which the machine is predictable (those alone
+    where they are shorter). Better are root mean square errors lower by `LESS_ERROR`, if
+    differences of windows' squared errors have a mean beyond `ERRORS_BEYOND` of its standard
+    errors; of fewer than three windows, errors half as large. True too where no window is long
+    enough to judge by.
     """
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
     longest = found.horizon or np.inf
-    for horizon in (h for h in HORIZONS if PREDICTABLE <= (h or np.inf) <= longest):
+    lengths = [h for h in HORIZONS if PREDICTABLE <= (h or np.inf) <= longest]
+    lengths = [h for h in lengths or [found.horizon] if h is None or _long_enough(found, unseen, h)]
+    for horizon in lengths:
         before = _squared_errors(found, unseen, found.base_estimator, found.base, horizon)
         after = _squared_errors(found, unseen, found.estimator, found.best, horizon)
-        for name, old in before.items():
-            new, share = after[name], np.sqrt(np.mean(after[name]) / np.mean(old))
-            if len(old) < 3:
-                better = share < HALF
-            else:
-                apart = np.mean(old - new) / (np.std(old - new, ddof=1) / len(old) ** 0.5)
-                better = share < LESS_ERROR and apart > ERRORS_BEYOND
-            if better:
-                return True
-    return False
+        if any(_better(after[name], old) for name, old in before.items()):
+            return True
+    return not lengths
+
+
+def _long_enough(found: Found, experiments: list[Experiment], horizon: float) -> bool:
+    """Whether windows of a length hold enough averaged rows of each recording."""
+    block = max(t.block for t in found.estimator.tracks)
+    rows = (horizon * scale_of(e).time_s / e.recording.sample_time_s for e in experiments)
+    return min(rows) > LEAST_ROWS_OF_WINDOW * block
+
+
+def _better(new: NDArray, old: NDArray) -> bool:
+    """Whether squared errors of windows (w,) are lower beyond chance; any are than none at all."""
+    if not np.all(np.isfinite(new)) or not np.mean(new) < LESS_ERROR**2 * np.mean(old):
+        return bool(np.all(np.isfinite(new)) and not np.all(np.isfinite(old)))
+    if len(old) < 3:
+        return bool(np.mean(new) < HALF**2 * np.mean(old))
+    unsure = np.std(old - new, ddof=1) / len(old) ** 0.5
+    return bool(np.mean(old - new) > ERRORS_BEYOND * unsure)
 
 
 def _squared_errors(

@@ -11,9 +11,7 @@ LEAST_ROWS = 10  # of a window
 QUIET = 5.0  # a reading that moves by fewer of its deviations says nothing of predictability
 PREDICTABLE = 1.0  # time scales of the motion: windows in which chaotic motions are predictable
 SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted first
-APPLIED_CURRENT = (
-    3.0  # of the sensor's noise: larger errors beside the commands are another current
-)
+APPLIED_CURRENT = 3.0  # deviations of the sensor: a larger error is that of another current
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
 UNLIKELY_TIMING = 500.0  # units behind: a timing with which no horizons are grown
 TIMING_DOUBT = 10.0  # units: a difference that does not tell a linear command from a held one
