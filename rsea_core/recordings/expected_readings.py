@@ -63,7 +63,7 @@ def expected_readings(rig: Rig, r: Recording, floors: dict[str, float]) -> list[
             both = float(np.hypot(stiffness * deflected[1], floors["torque_Nm"]))
             phrase = f"spring_stiffness_Nm_per_rad times {source}"
             found.append(_expected("torque_Nm", phrase, r, stiffness * deflected[0], both))
-    current = _winding_current(rig, r, floors)
+    current = _winding_current(rig, r, floors) or _commanded_current(rig, r, floors)
     if current is not None:
         found.append(current)
     for side in ("motor", "load"):
@@ -88,6 +88,31 @@ def _winding_current(rig: Rig, r: Recording, floors: dict[str, float]) -> Expect
     current = np.clip((volts - emf) / resistance, -limit, limit)
     source = "the current that the winding's voltage drives"
     return _expected("current_A", source, r, current, floors["current_A"])
+
+
+def _commanded_current(rig: Rig, r: Recording, floors: dict[str, float]) -> ExpectedReading | None:
+    """The current that an amplifier was told to regulate; none while it is disabled.
+
+    An amplifier may limit it below what the rig file says: then the command that is limited to the
+    largest current read correlates better with the current than the whole command does.
+    """
+    given = r.command_name == "current_command_A" and "current_A" in r.responses
+    if not given or ("drive_enabled" in r and np.any(r["drive_enabled"] == 0.0)):
+        return None
+    current, most = r["current_A"], rig.current_limit_A or np.inf
+    command = np.clip(r["current_command_A"], -most, most)
+    reached = float(np.max(np.abs(current)))
+    limited = np.clip(command, -reached, reached)
+    if _correlation(limited, current) > _correlation(command, current):
+        command = limited
+    return _expected("current_A", "current_command_A", r, command, floors["current_A"])
+
+
+def _correlation(x: NDArray, y: NDArray) -> float:
+    """Of two columns (n,); 0 where one of them is constant."""
+    if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
+        return 0.0
+    return float(np.corrcoef(x, y)[0, 1])
 
 
 def _motor_speed(rig: Rig, r: Recording) -> NDArray | float | None:

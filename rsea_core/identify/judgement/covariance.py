@@ -63,9 +63,14 @@ class Spread:
         return max(found)
 
     def squared_distance(self, at: Sequence[int], apart: NDArray) -> float:
-        """Least square of a distance (k,) of some unknowns, in the covariance of each source.
+        """Smallest squared Mahalanobis distance of some unknowns, among the sources' covariances.
 
-        A source without any variance there says nothing.
+        Sources in which these unknowns have no variance are left out.
+
+        Parameters
+        ----------
+        at, apart : (k,) sequences
+            Indices of the unknowns, and by how much each differs.
         """
         found = []
         for C in self.sources:

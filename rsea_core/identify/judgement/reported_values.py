@@ -87,13 +87,13 @@ def shown(figures: Mapping[str, dict]) -> bool:
 
 
 def sizes_shown(law: Law, first: int, x: NDArray, spread: Spread) -> bool:
-    """Whether the sizes in proportion to which a law acts, taken together, differ from none.
+    """Whether the numbers to which a law is proportional, taken together, differ from no effect.
 
     A figure may depend on other unknowns as well (the width of a loop on the yield of a slip that
-    never slides), and two sizes may be known together only (both efficiencies of a gear). The
-    squared distance in the spread's covariance has a chi-squared distribution; its limit is that of
-    `SHOWN_STD` deviations of one size. False of an unbalance: how far the rig's mass may be off is
-    in the variance of its figure, not in that of its sizes.
+    never slides), and the data may determine two such numbers only together (both efficiencies of
+    a gear). The squared Mahalanobis distance is compared with the chi-squared quantile that
+    corresponds to `SHOWN_STD` deviations of one number. False for an unbalance: only the variance
+    of its figure includes how far the rig's mass may be off.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def sizes_shown(law: Law, first: int, x: NDArray, spread: Spread) -> bool:
     at, apart = [], []
     for j, u in enumerate((u for u in law.unknowns if u.scale > 0.0), start=first):
         none = 1.0 / u.scale if u.name in AT_ONE and not u.log else 0.0
-        # the logarithm of a size never reaches none; that of a ratio does
+        # a size that is fitted by its logarithm is never zero; a ratio can be one
         if u.name in AT_ONE or (u.name in FROM_ZERO and not u.log):
             at.append(j)
             apart.append(x[j] - none)

@@ -21,7 +21,7 @@ from rsea_core.identify.law_search.candidate_fits import even_ratio
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import (
     ERRORS_BEYOND,
-    HALF,
+    FEW_WINDOWS_ERROR,
     HORIZONS,
     KEPT_RATIO,
     LESS_ERROR,
@@ -47,6 +47,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
 SHARED, LAST = 2.0 / 3.0, 0.25  # of a recording's rows
+LEAST_WINDOWS = 3  # for a standard error
 PAUSES_s = (1.0, 30.0, 300.0, 3000.0)  # trial values of the pause between two recordings
 
 
@@ -144,8 +145,9 @@ def beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
 
     Laws that lose in windows as long as the machine seemed predictable, and gain evenly in short
     ones, are not refuted: the recordings held out are not predictable for so long. Lasting laws
-    that matter there are refuted if no reading is predicted better (`predicts_better`): the noise
-    that they leave small makes any other model unlikely, however it predicts.
+    whose likelihood differs there are dropped if no reading is predicted better
+    (`predicts_better`): in the small noise estimated with them any other model is unlikely, however
+    well it predicts.
     """
     unseen = held_out(found) if found.steps else None
     if unseen is None or unseen.gain >= WORSE:
@@ -164,11 +166,11 @@ def beyond_chance(found: Found) -> tuple[Found, HeldOut | None]:
 def predicts_better(found: Found) -> bool:
     """Whether laws predict any reading of recordings held out better than parameters alone do.
 
-    In windows from one time scale to the longest in which the machine is predictable (those alone
-    where they are shorter). Better are root mean square errors lower by `LESS_ERROR`, if
-    differences of windows' squared errors have a mean beyond `ERRORS_BEYOND` of its standard
-    errors; of fewer than three windows, errors half as large. True too where no window is long
-    enough to judge by.
+    Windows are from one time scale long to the longest in which the machine is predictable; if that
+    is shorter, only these. A reading is predicted better if its root mean square error is below
+    `LESS_ERROR` of that of parameters alone and the mean difference of the windows' squared errors
+    exceeds `ERRORS_BEYOND` of its standard errors; with fewer than three windows, if the error is
+    below `FEW_WINDOWS_ERROR` of it. True too if no window is long enough to judge by.
     """
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
     longest = found.horizon or np.inf
@@ -177,7 +179,7 @@ def predicts_better(found: Found) -> bool:
     for horizon in lengths:
         before = _squared_errors(found, unseen, found.base_estimator, found.base, horizon)
         after = _squared_errors(found, unseen, found.estimator, found.best, horizon)
-        if any(_better(after[name], old) for name, old in before.items()):
+        if any(lower_beyond_chance(after[name], old) for name, old in before.items()):
             return True
     return not lengths
 
@@ -189,14 +191,20 @@ def _long_enough(found: Found, experiments: list[Experiment], horizon: float) ->
     return min(rows) > LEAST_ROWS_OF_WINDOW * block
 
 
-def _better(new: NDArray, old: NDArray) -> bool:
-    """Whether squared errors of windows (w,) are lower beyond chance; any are than none at all."""
-    if not np.all(np.isfinite(new)) or not np.mean(new) < LESS_ERROR**2 * np.mean(old):
-        return bool(np.all(np.isfinite(new)) and not np.all(np.isfinite(old)))
-    if len(old) < 3:
-        return bool(np.mean(new) < HALF**2 * np.mean(old))
-    unsure = np.std(old - new, ddof=1) / len(old) ** 0.5
-    return bool(np.mean(old - new) > ERRORS_BEYOND * unsure)
+def lower_beyond_chance(new: NDArray, old: NDArray) -> bool:
+    """Whether mean squared errors of windows (w,) are lower than others (w,) beyond chance.
+
+    True where only the new ones are finite.
+    """
+    if not np.all(np.isfinite(new)):
+        return False
+    if not np.all(np.isfinite(old)):
+        return True
+    if len(old) < LEAST_WINDOWS:
+        return bool(np.mean(new) < FEW_WINDOWS_ERROR**2 * np.mean(old))
+    standard_error = np.std(old - new, ddof=1) / len(old) ** 0.5
+    lower = np.mean(new) < LESS_ERROR**2 * np.mean(old)
+    return bool(lower and np.mean(old - new) > ERRORS_BEYOND * standard_error)
 
 
 def _squared_errors(

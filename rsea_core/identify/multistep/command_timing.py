@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from rsea_core.engines.fixed_step.replay import CHANNELS
 from rsea_core.identify.multistep.criteria import APPLIED_CURRENT
 from rsea_core.recordings.case import Case, apparent_noise, noise_floor
+from rsea_core.recordings.consistency_checks import FACTOR
 from rsea_core.recordings.recording import Recording
 
 UNEVEN = 2e-3  # of a row: rms deviation of the stamps below which they are even
@@ -74,36 +75,38 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
 
 
 def current_is_commanded(case: Case) -> bool:
-    """Whether an amplifier's current is that of the commands that the log holds.
+    """Whether a measured current is that of the current commands in the log.
 
-    A loop that runs faster than its log, or an amplifier that is slow, applies currents of which no
-    row tells; then a measured current is no reading of what the model simulates. Compared are the
-    fastest errors of a regression on the last commands, which the laws of a sensor or a drive
-    (offset, drift, scale, delay, saturation) leave as small as the sensor's noise in at least one
-    recording.
+    A loop that runs faster than its log, or a slow amplifier, applies currents that no row holds;
+    then the measured current is no reading of what the model simulates. Compared are the fastest
+    errors of a regression on the last commands: with an offset, a drift, a scale factor, a delay or
+    a limit they are as small as the sensor's noise in at least one recording. A current of the
+    wrong sign or unit is none of these.
     """
     read = [
         r for r in case.identification
         if r.command_name == "current_command_A" and "current_A" in r.responses
     ]  # fmt: skip
-    floors = [noise_floor(case.rig, r, order=4)["current_A"] for r in read]
-    return any(
-        _noise_left_by_commands(r) < APPLIED_CURRENT * floor
-        for r, floor in zip(read, floors, strict=True)
-    )
+    for r in read:
+        gain, noise = _gain_of_commands(r)
+        floor = noise_floor(case.rig, r, order=4)["current_A"]
+        if 1.0 / FACTOR < gain < FACTOR and noise < APPLIED_CURRENT * floor:
+            return True
+    return False
 
 
-def _noise_left_by_commands(r: Recording) -> float:
-    """Apparent noise [A] of a current beside a linear function of its last commands."""
+def _gain_of_commands(r: Recording) -> tuple[float, float]:
+    """Steady gain of a current by its last commands, and the apparent noise [A] that they leave."""
     command, current = r["current_command_A"], r["current_A"]
     rows, last = r.rows, CURRENT_ROWS - 1
     if rows < 2 * CURRENT_ROWS:
-        return np.inf
+        return 0.0, np.inf
     columns = [command[last - j : rows - j] for j in range(CURRENT_ROWS)]
     columns += [np.ones(rows - last), r.time_s[last:]]
     design = np.stack(columns, axis=1)
-    left = current[last:] - design @ np.linalg.lstsq(design, current[last:], rcond=None)[0]
-    return apparent_noise(left, order=2)
+    found = np.linalg.lstsq(design, current[last:], rcond=None)[0]
+    left = current[last:] - design @ found
+    return float(np.sum(found[:CURRENT_ROWS])), apparent_noise(left, order=2)
 
 
 def runs_at(

@@ -191,8 +191,8 @@ def experiment(
     Parameters
     ----------
     current_commanded : bool
-        Whether a current that is read beside a command of current is that one's
-        (`current_is_commanded`), and so predicted.
+        Whether a current measured beside a current command is the commanded one
+        (`current_is_commanded`), and therefore predicted.
     """
     inputs = r.inputs()
     even = None if timing.rows is RowTimes.LOGGED else even_times(r.time_s)

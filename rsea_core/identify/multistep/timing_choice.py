@@ -1,6 +1,6 @@
-"""Which timing of the commands a search takes, and mean commands in long recordings.
+"""Which timing of the commands a search uses, and mean commands in long recordings.
 
-Held or linear commands, at the stamps of the rows or at even times, are compared by what each makes
+Held or linear commands, at the stamps of the rows or at even times, are compared by the likelihood
 of the readings (docs/diagnosis.md 10.2). A command that moves linearly from row to row is simulated
 in `FINER` parts of each row, which multiplies the steps: where a cycle of the machine has thousands
 of rows (EMPS: 5900), the mean over each row is accurate enough.
@@ -74,7 +74,7 @@ def parameters_with_timing(
 
 
 def _behind(growth: Growth, problem: MultistepProblem) -> float:
-    """Units by which another timing's problem is less likely where a growth ended, refitted."""
+    """Units by which a problem with another timing is less likely, refitted from a growth's end."""
     estimator, fit, _ = growth
     h = fit.hypothesis
     other = with_problem(estimator, problem)

@@ -190,6 +190,31 @@ def test_the_windings_current_is_compared_by_whatever_column_shows_the_motors_sp
     assert inconsistencies(RIG, unseen) == []
 
 
+@pytest.mark.parametrize(
+    ("measured", "phrase"),
+    [
+        (lambda i: i, None),
+        (lambda i: np.clip(i, -0.1, 0.1), None),  # a limit that the rig file does not know
+        (lambda i: 1.2 * i + 0.3, None),
+        (lambda i: -i, "current_A runs against current_command_A"),
+        (lambda i: 1000.0 * i, "current_A is 1000 times current_command_A"),
+        (lambda i: 0.001 * i, "current_A is 0.001 times current_command_A"),
+        (lambda i: 0.0 * i, "current_A never moves although current_command_A does"),
+    ],
+)
+def test_a_current_is_compared_with_the_one_that_was_commanded(measured, phrase):
+    r = recorded("free")
+    command = np.sin(np.pi * r.time_s)
+    columns = {"time_s": r.time_s, "current_command_A": command, "current_A": measured(command),
+               "motor_angle_rad": r["motor_angle_rad"]}  # fmt: skip
+    rig = replace(RIG, current_sensor_noise_A=1e-6)
+    texts = sentences(inconsistencies(rig, replace(r, columns=columns)))
+    assert not texts if phrase is None else any(phrase in text for text in texts)
+    open_bridge = columns | {"drive_enabled": 0.0 * command}
+    disabled = sentences(inconsistencies(rig, replace(r, columns=open_bridge)))
+    assert not any("current_command_A" in text for text in disabled)
+
+
 def test_a_motor_that_starts_without_a_command_was_driven():
     rest = np.maximum(np.arange(ROWS) - 100, 0)
     r = recorded(duty=lambda v: 0.0 * v, motor_angle_rad=lambda v: v[rest])

@@ -12,6 +12,7 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.hold_out import (
     beyond_chance,
     held_out,
+    lower_beyond_chance,
     part_of,
     predicts_better,
     with_pause_shown,
@@ -135,3 +136,24 @@ def test_a_law_predicts_better_if_errors_of_recordings_held_out_are_smaller(
     x[-1] *= factor
     found.best = replace(found.best, x=x)
     assert predicts_better(found) is better
+
+
+OLD = np.array([4.0, 5.0, 6.0, 5.0])
+
+
+@pytest.mark.parametrize(
+    ("new", "old", "lower"),
+    [
+        (0.5 * OLD, OLD, True),
+        (0.92 * OLD, OLD, False),  # 0.96 of the root mean square error
+        (0.5 * OLD[::-1] + [0.0, 0.0, 0.0, 8.0], OLD, False),  # one window is far worse
+        (OLD * [0.1, 0.9, 1.1, 0.9], OLD, False),  # lower by chance
+        (0.3 * OLD[:2], OLD[:2], False),
+        (0.2 * OLD[:2], OLD[:2], True),
+        (OLD, OLD * np.inf, True),
+        (OLD * np.nan, OLD, False),
+        (OLD * np.nan, OLD * np.nan, False),
+    ],
+)
+def test_errors_of_windows_are_lower_beyond_chance(new, old, lower):
+    assert lower_beyond_chance(new, old) is lower

@@ -1,7 +1,6 @@
-"""A measured current is a reading of a current-controlled machine if the log holds its commands.
+"""With a commanded current a measured one is a reading if it follows the commands of the log.
 
-An amplifier that regulates the current applies what it was commanded. A loop that runs faster than
-its log applies currents of which no row tells.
+A loop that runs faster than its log applies currents that no row holds.
 """
 
 from dataclasses import replace
@@ -19,19 +18,17 @@ NOISE_A = 0.01
 DRIFT_A_per_s = 0.012
 
 
-def with_current(folder, applied, *, seeds=(1,)) -> Case:
-    """A case of an axis whose current is read: `applied` of the commands, with noise."""
-    recordings = []
-    for seed in seeds:
-        plain = axis_recording(seed=seed)
-        noise = NOISE_A * np.random.default_rng(100 + seed).standard_normal(plain.rows)
-        current = applied(plain["current_command_A"], plain.time_s) + noise
-        recordings.append(replace(plain, columns={**plain.columns, "current_A": current}))
+def with_current(folder, applied) -> Case:
+    """A case of an axis whose measured current is `applied` of commands and times, with noise."""
+    plain = axis_recording(seed=1)
+    noise = NOISE_A * np.random.default_rng(101).standard_normal(plain.rows)
+    current = applied(plain["current_command_A"], plain.time_s) + noise
+    recording = replace(plain, columns={**plain.columns, "current_A": current})
     rig = replace(axis_rig(), current_sensor_noise_A=NOISE_A)
-    return axis_case(folder, *recordings, rig=rig)
+    return axis_case(folder, recording, rig=rig)
 
 
-def late(command, rows: int = 1):
+def delayed(command, rows: int = 1):
     """The command of some rows before, zero in the first ones."""
     return np.concatenate([np.zeros(rows), command[:-rows]])
 
@@ -39,12 +36,12 @@ def late(command, rows: int = 1):
 @pytest.mark.parametrize(
     "applied",
     [
-        lambda u, t: late(u),
-        lambda u, t: late(u, 2) + 0.3,
-        lambda u, t: 1.1 * late(u) + DRIFT_A_per_s * t,
-        lambda u, t: np.clip(late(u), -1.5, 1.5),
+        lambda u, t: delayed(u),
+        lambda u, t: delayed(u, 2) + 0.3,
+        lambda u, t: 1.1 * delayed(u) + DRIFT_A_per_s * t,
+        lambda u, t: np.clip(delayed(u), -1.5, 1.5),
     ],
-    ids=["held", "late with an offset", "scale and drift", "limited"],
+    ids=["held", "delayed with an offset", "scale and drift", "limited"],
 )
 def test_a_current_that_follows_the_commands_of_the_log_is_predicted(tmp_path, applied):
     case = with_current(tmp_path, applied)
@@ -53,20 +50,25 @@ def test_a_current_that_follows_the_commands_of_the_log_is_predicted(tmp_path, a
     assert set(found.channels) == {"motor_angle_rad", "current_A"}
 
 
-def test_a_current_of_commands_that_the_log_lacks_is_not_predicted(tmp_path):
-    between = np.random.default_rng(5)
-
-    def faster(u, t):
-        return late(u) + 0.2 * between.standard_normal(len(u))
-
-    case = with_current(tmp_path, faster)
+@pytest.mark.parametrize(
+    "applied",
+    [
+        lambda u, t: delayed(u) + 0.2 * np.random.default_rng(5).standard_normal(len(u)),
+        lambda u, t: -delayed(u),
+        lambda u, t: 1000.0 * delayed(u),
+        lambda u, t: 0.0 * u,
+    ],
+    ids=["commands that the log lacks", "wrong sign", "wrong unit", "dead sensor"],
+)
+def test_any_other_current_is_not_predicted(tmp_path, applied):
+    case = with_current(tmp_path, applied)
     assert not current_is_commanded(case)
     (found,) = MultistepProblem(case).fitted
     assert found.channels == ("motor_angle_rad",)
 
 
 def test_a_drift_of_the_current_sensor_is_found_where_current_is_commanded(tmp_path):
-    case = with_current(tmp_path, lambda u, t: late(u) + DRIFT_A_per_s * t)
+    case = with_current(tmp_path, lambda u, t: delayed(u) + DRIFT_A_per_s * t)
     document = diagnose_windows(case).document
     (effect,) = [e for e in document["effects"] if e["confidence"] >= 0.5]
     assert (effect["name"], effect["subsystem"]) == ("sensor-drift", "sensor:current_A")

@@ -1,4 +1,4 @@
-"""Long recordings have one mean command per row where the innovations hardly change by it."""
+"""Which timings of the commands are tried, and when rows have one mean command."""
 
 import numpy as np
 import pytest
@@ -46,3 +46,23 @@ def test_rows_whose_innovations_change_keep_their_parts(fitted, monkeypatch):
     monkeypatch.setattr(timing_choice, "LONG_ROWS", 1000)
     monkeypatch.setattr(timing_choice, "LOST_IN_NOISE", 1e-6)
     assert with_mean_commands(estimator, base) is estimator
+
+
+@pytest.mark.parametrize(("unlikely", "timings"), [(500.0, [False]), (np.inf, [False, True])])
+def test_no_horizons_are_grown_with_a_timing_that_is_far_less_likely(
+    tmp_path, monkeypatch, unlikely, timings
+):
+    """The commands are held: with linear ones the readings are 7800 units less likely."""
+    grown, plain = [], timing_choice.parameters
+
+    def recorded(problem, h, say, *, output_errors=False):
+        if output_errors:
+            grown.append(problem.timing.linear)
+        return plain(problem, h, say, output_errors=output_errors)
+
+    monkeypatch.setattr(timing_choice, "parameters", recorded)
+    monkeypatch.setattr(timing_choice, "DOUBTED_ERROR", 0.0)  # any fit is in doubt
+    monkeypatch.setattr(timing_choice, "UNLIKELY_TIMING", unlikely)
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    parameters_with_timing(case, Hypothesis(laws=nuisances(case)), lambda text: None)
+    assert grown == timings

@@ -38,3 +38,9 @@ def test_a_law_at_a_bound_is_taken_where_another_law_moves_it_from_there(tmp_pat
 
 def test_a_law_that_stays_at_its_bound_is_not_taken(tmp_path):
     assert searched(tmp_path, 0.03).begun_at_bound(lambda text: None) is None
+
+
+def test_a_law_at_a_bound_that_explains_little_is_not_followed(tmp_path):
+    search = searched(tmp_path, 0.016)
+    search.best_at_bound = replace(search.best_at_bound, gain=0.1 * search.best_at_bound.gain)
+    assert search.begun_at_bound(lambda text: None) is None
