@@ -214,7 +214,14 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
             f" {timing.rows}; the simulation uses this"
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
-    if timing.linear:
+    if timing.fast_share < 1.0:
+        text = (
+            "the loop ran faster than its log: the command of a row is one of many, and noisy as an"
+            " input; the simulation uses smoothed commands, and a torque of unknown shape beside"
+            " them is no evidence of missing physics (log the mean command of each row)"
+        )
+        found.append(Finding(kind=Kind.METHOD, text=text))
+    elif timing.linear:
         text = "the command moves linearly from row to row of these logs; it is simulated so"
         found.append(Finding(kind=Kind.METHOD, text=text))
     found += _zeros(conclusion)

@@ -101,8 +101,11 @@ def strained_value(problem: MultistepProblem, fit: FoundFit) -> Nominal | None:
     """The stated value from which a fit went furthest (a damping: upwards), if too far.
 
     An inductance that changes the winding's time constant by a small share of a row does not
-    count: a command that moves within rows looks the same.
+    count: a command that moves within rows looks the same. Where the commands of the rows are not
+    known, a value that moved is no evidence of what is missing.
     """
+    if problem.timing.fast_share < 1.0:
+        return None
     moved = np.abs(fit.x[: len(problem.nominals)]) * problem.stated
     nominal = problem.values(fit.hypothesis, fit.x)[0]
     row = min(e.recording.sample_time_s for e in problem.fitted)

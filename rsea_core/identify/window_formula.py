@@ -140,7 +140,8 @@ def unnamed_formula(
     """What has no name: its shape, and a formula of the command if that predicts, or of the motion.
 
     A formula of the command takes the place of the shape; beside laws there is none. Where
-    parameters leave little more than noise, that formula alone is tried.
+    parameters leave little more than noise, that formula alone is tried. A torque on the body that
+    the command moves is none where the commands of the rows are not known.
 
     Parameters
     ----------
@@ -149,6 +150,8 @@ def unnamed_formula(
     """
     if instead is not None:
         return None, instead
+    if found.problem.timing.fast_share < 1.0 and not _beyond_spring(found, shape):
+        return None, None
     if found.steps:
         return shape, None
     if found.sound:
@@ -158,6 +161,12 @@ def unnamed_formula(
         if formula is not None:
             return None, formula
     return shape, formula_of(found, shape, say)
+
+
+def _beyond_spring(found: Found, shape: Shape | None) -> bool:
+    """Whether an unknown torque acts where no command does: in a spring or behind it."""
+    sprung = "S" in ports(found.estimator.tracks[0])
+    return sprung and shape is not None and shape.port in ("S", "L")
 
 
 def gain_over_named(found: Found, say: Callable[[str], None]) -> CommandFormula | None:

@@ -91,7 +91,7 @@ class WindowVerdict(Conclusion):
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
-        self.dependent = self.dependent and not found.sound
+        self.dependent &= not found.sound and self.problem.timing.fast_share == 1.0
         self.reason = _reason_of(self)
         self.verdict = self._verdict()
 

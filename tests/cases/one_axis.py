@@ -35,13 +35,15 @@ class Units:
         return self.torque * self.time
 
 
-def axis_rig(units: Units = Units(), *, off: float = 1.0) -> Rig:
+def axis_rig(units: Units = Units(), *, off: float = 1.0, counts: int = COUNTS) -> Rig:
     """A direct drive with a regulated current that turns a wheel.
 
     Parameters
     ----------
     off : float
         Factor of the load's inertia, for a rig file that is wrong by it.
+    counts : int
+        Of the encoder, in a turn.
     """
     return Rig(
         name="axis",
@@ -52,7 +54,7 @@ def axis_rig(units: Units = Units(), *, off: float = 1.0) -> Rig:
         gear_ratio=1.0,
         load_inertia_kgm2=0.02 * units.inertia * off,
         load_viscous_Nms_per_rad=0.02 * units.damping,
-        motor_encoder_counts_per_rev=COUNTS,
+        motor_encoder_counts_per_rev=counts,
     )
 
 

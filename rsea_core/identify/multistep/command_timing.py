@@ -12,14 +12,16 @@ from enum import StrEnum
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.fft import dct, idct
 
 from rsea_core.engines.fixed_step.replay import CHANNELS
-from rsea_core.identify.multistep.criteria import APPLIED_CURRENT
+from rsea_core.identify.multistep.criteria import APPLIED_CURRENT, FAST_SHARE, TURNS
 from rsea_core.recordings.case import Case, apparent_noise, noise_floor
 from rsea_core.recordings.consistency_checks import FACTOR
 from rsea_core.recordings.recording import Recording
 
 UNEVEN = 2e-3  # of a row: rms deviation of the stamps below which they are even
+LOG_WEIGHTS = (-4.0, 24.0, 0.25)  # decades of the smoother's weight of fourth differences
 FARTHEST = 0.5  # of a row: a stamp further from its even time belongs to another row
 CURRENT_ROWS = 4  # commands to which the current of a row is compared: its own and those before
 CURRENT = CHANNELS.index("current_A")
@@ -39,10 +41,18 @@ class RowTimes(StrEnum):
 
 @dataclass(frozen=True, kw_only=True)
 class CommandTiming:
-    """How a command moves between rows (linearly, or held) and what the stamps say."""
+    """How a command moves between rows (linearly, or held) and what the stamps say.
+
+    Attributes
+    ----------
+    fast_share : float
+        Of what smoothing takes from a command that turns often (`turns_often`), the share that
+        acts: 1 if commands are applied as the log has them.
+    """
 
     linear: bool = False
     rows: RowTimes = RowTimes.LOGGED
+    fast_share: float = 1.0
 
 
 AS_LOGGED = CommandTiming()
@@ -71,7 +81,47 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
     uneven = any(even_times(r.time_s if r.logged is None else r.logged["time_s"]) is not None
                  for r in driven)  # fmt: skip
     rows = [t for t in RowTimes if uneven and t is not timing.rows]
-    return [replace(timing, rows=t) for t in rows] + [replace(timing, linear=not timing.linear)]
+    found = [replace(timing, rows=t) for t in rows]
+    plain = (False, True) if timing.fast_share < 1.0 else (not timing.linear,)
+    found += [replace(timing, linear=x, fast_share=1.0) for x in plain]
+    if timing.fast_share == 1.0 and any(turns_often(r[r.command_name]) for r in driven):
+        found.append(replace(timing, linear=True, fast_share=FAST_SHARE))
+    return found
+
+
+def turns_often(command: NDArray) -> bool:
+    """Whether a command (n,) rises after it fell, or falls after it rose, in many of its rows."""
+    steps = np.diff(command)
+    return bool(np.mean(steps[1:] * steps[:-1] < 0.0) > TURNS) if len(steps) > 1 else False
+
+
+def mean_commands(command: NDArray, fast_share: float) -> NDArray:
+    """The means over rows that a command (n,), one value of each row, is an estimate of.
+
+    A loop that runs faster than its log commands many values in a row. The one in the log holds
+    what the encoder's counts and the derivative gave in that moment: as an input it is noisy, and a
+    fit that takes it for the applied command finds too small a gain (errors in variables).
+    Of what a smoother takes away only a share acts. The smoother penalises fourth differences, with
+    the weight of least generalised cross-validation, in the basis of cosines: Garcia, Computational
+    Statistics & Data Analysis 54 (2010) 1167, eqs. 8, 13 and 14, of second differences there, which
+    attenuate the fastest motion that they pass. The line through first and last value is left
+    out, whose ends a cosine does not follow.
+    """
+    n = len(command)
+    line = np.linspace(command[0], command[-1], n)
+    waves = dct(command - line, norm="ortho")
+    roughness = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) ** 4
+
+    def passed(log_weight: float) -> NDArray:
+        return 1.0 / (1.0 + 10.0**log_weight * roughness)
+
+    def validation(log_weight: float) -> float:
+        share = passed(log_weight)
+        return float(np.sum(((1.0 - share) * waves) ** 2) / (n - np.sum(share)) ** 2)
+
+    best = min(np.arange(*LOG_WEIGHTS), key=validation)
+    slow = line + idct(passed(best) * waves, norm="ortho")
+    return slow + fast_share * (command - slow)
 
 
 def current_is_commanded(case: Case) -> bool:

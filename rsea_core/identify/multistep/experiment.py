@@ -35,7 +35,9 @@ from rsea_core.identify.multistep.command_timing import (
     RowTimes,
     current_is_commanded,
     even_times,
+    mean_commands,
     runs_at,
+    turns_often,
 )
 from rsea_core.identify.multistep.criteria import FIRST_STEPS
 from rsea_core.machine.command_motion import FINER, between_rows
@@ -211,7 +213,10 @@ def experiment(
     replay = Replay.of(inputs, **of_rows, **more)
     numbers = replay.numbers(model)
     cycle = _cycle_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
-    finer = 1
+    finer, name = 1, inputs.command_name
+    if timing.fast_share < 1.0 and name is not None and turns_often(getattr(inputs, name)):
+        means = mean_commands(getattr(inputs, name), timing.fast_share)
+        inputs = replace(inputs, **{name: means})
     if timing.linear and r.load.kind != "imposed" and r.command_name:
         finer = steps.parts_of_row
         inputs, of_rows = between_rows(inputs, of_rows, finer)

@@ -70,6 +70,8 @@ def parameters_with_timing(
         if len(ends) > 1 and _behind(ends[1], problem) > UNLIKELY_TIMING:
             continue
         ends.append(parameters(problem, h, say, output_errors=True))
+        if each.fast_share < 1.0:  # noisy commands make output errors large
+            ends.append(parameters(problem, h, say))
     return best_of(*ends)
 
 
@@ -92,7 +94,7 @@ def _in_doubt(growth: Growth) -> bool:
 def with_better_timing(estimator, base, case, say) -> tuple[Estimator, Estimate]:
     """The timing of the commands that makes the readings likeliest, if another one is better."""
     tried = {estimator.problem.timing}
-    for _ in range(len(RowTimes) + 1):
+    for _ in range(len(RowTimes) + 2):
         others = [t for t in timings(case, estimator.problem.timing) if t not in tried]
         if not others:
             break
@@ -116,6 +118,8 @@ def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estim
         fit = other.fit(h, fit.x)
         better = fit.cost < base.cost - least
     hold = "linear" if timing.linear else "held"
+    if timing.fast_share < 1.0:
+        hold += f", {timing.fast_share:g} of its fast part"
     gain = base.cost - fit.cost
     say(f"command {hold}, stamps are times of {timing.rows}: {gain:.1f} units likelier")
     if not better:

@@ -1,0 +1,86 @@
+"""Loops that run faster than their log: noisy commands are smoothed, and no constant is bent."""
+
+import numpy as np
+import pytest
+
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.multistep.command_timing import (
+    AS_LOGGED,
+    CommandTiming,
+    mean_commands,
+    timings,
+    turns_often,
+)
+from rsea_core.identify.multistep.criteria import FAST_SHARE
+from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing
+from rsea_core.identify.window_diagnosis import diagnose_windows
+from tests.cases.fast_loop import fast_loop_recording, fast_loop_rig
+from tests.cases.one_axis import axis_case
+
+ROW_s, N = 0.02, 400
+GRID = ROW_s * np.arange(N)
+
+
+def test_smoothing_keeps_what_noisy_commands_mean():
+    """Errors in variables: the noise of a regressor lowers the slope of what follows from it."""
+    true = np.sin(2.0 * np.pi * 0.4 * GRID) + 0.5 * np.sin(2.0 * np.pi * 0.6 * GRID)
+    logged = true + 0.8 * np.random.default_rng(4).standard_normal(N)
+    found = mean_commands(logged, 0.0)
+    assert np.polyfit(logged, true, 1)[0] < 0.6
+    assert np.polyfit(found, true, 1)[0] == pytest.approx(1.0, abs=0.05)
+    assert np.std(found - true) < 0.35 * 0.8
+
+
+def test_a_share_of_what_smoothing_takes_away_acts():
+    command = GRID + np.random.default_rng(5).standard_normal(N)
+    none, half, all_of_it = (mean_commands(command, share) for share in (0.0, 0.5, 1.0))
+    np.testing.assert_allclose(half, 0.5 * (none + command), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(all_of_it, command, rtol=0.0, atol=1e-12)
+
+
+def test_a_straight_command_is_its_own_mean():
+    np.testing.assert_allclose(mean_commands(3.0 - GRID, 0.0), 3.0 - GRID, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("command", "often"),
+    [
+        (np.sin(2.0 * np.pi * 1.9 * GRID), False),  # 26 rows in a cycle
+        (np.repeat(np.random.default_rng(6).choice([-1.0, 1.0], N // 4), 4), False),
+        (np.random.default_rng(7).standard_normal(N), True),
+        (np.zeros(N), False),
+        (np.zeros(2), False),
+    ],
+    ids=["sine", "binary", "noise", "none", "two rows"],
+)
+def test_noise_turns_often_and_inputs_that_are_held_do_not(command, often):
+    assert turns_often(command) is often
+
+
+def test_smoothed_commands_are_tried_where_a_loop_runs_faster_than_its_log(tmp_path):
+    case = axis_case(tmp_path, fast_loop_recording(seed=1), rig=fast_loop_rig())
+    smooth = CommandTiming(linear=True, fast_share=FAST_SHARE)
+    assert timings(case, AS_LOGGED) == [CommandTiming(linear=True), smooth]
+    assert timings(case, smooth) == [CommandTiming(), CommandTiming(linear=True)]
+
+
+def test_a_sound_axis_in_a_loop_faster_than_its_log_lacks_no_physics(tmp_path):
+    made = [fast_loop_recording(seed=s) for s in (1, 2)]
+    found = diagnose_windows(axis_case(tmp_path, *made, rig=fast_loop_rig()))
+    assert found.document["verdict"] in ("no-mismatch", "parameters-only")
+    assert found.conclusion.problem.timing.fast_share == FAST_SHARE
+    moved = found.conclusion.fit.x[: len(found.conclusion.problem.nominals)]
+    assert np.max(np.abs(moved)) < 2.0
+    assert any("faster than its log" in note.text for note in found.conclusion.notes)
+
+
+@pytest.mark.parametrize("timing", [CommandTiming(linear=True), None], ids=["logged", "chosen"])
+def test_noisy_commands_of_the_log_bend_the_torque_constant_and_smoothed_ones_do_not(
+    tmp_path, timing
+):
+    case = axis_case(tmp_path, fast_loop_recording(seed=1), rig=fast_loop_rig())
+    h = Hypothesis(laws=nuisances(case))
+    estimator, base, _ = parameters_with_timing(case, h, lambda text: None, timing=timing)
+    moved = base.x[estimator.problem.names(h).index("torque_constant_Nm_per_A")]
+    assert moved < -4.0 if timing else abs(moved) < 1.0
