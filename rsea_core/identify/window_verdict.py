@@ -16,7 +16,7 @@ from rsea_core.identify.judgement.reported_values import shown, sizes_shown
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
-from rsea_core.identify.law_search.hold_out import beyond_chance, free_run
+from rsea_core.identify.law_search.hold_out import HeldOut, beyond_chance, free_run
 from rsea_core.identify.law_search.longer_windows import fails_in_longer_windows
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
@@ -50,7 +50,11 @@ from rsea_core.identify.window_fit import (
     strained_value,
     unknown_torque,
 )
-from rsea_core.identify.window_formula import gain_over_named, unnamed_formula
+from rsea_core.identify.window_formula import (
+    CommandFormula,
+    gain_over_named,
+    unnamed_formula,
+)
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
@@ -61,10 +65,7 @@ class WindowVerdict(Conclusion):
     """Everything that is said of one case, of a multistep search."""
 
     def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
-        found, self.held_out = beyond_chance(found)
-        instead = None if found.complete else gain_over_named(found, say)
-        if instead is not None:
-            found, self.held_out = found.parameters_alone(), None
+        found, self.held_out, instead = _with_evidence(found, say)
         self.found, self.problem = found, found.problem
         self.case, self.recorded = self.problem.case, recorded
         plain = fit_of(found.base_estimator, found.base)
@@ -307,6 +308,22 @@ class WindowVerdict(Conclusion):
             for b in order
         ]
         return "after re-estimating parameters, in " + ", ".join(named)
+
+
+def _with_evidence(
+    found: Found, say: Callable[[str], None]
+) -> tuple[Found, HeldOut | None, CommandFormula | None]:
+    """The laws that there is evidence of, their gain held out, and a formula instead of a law.
+
+    Where the commands of the rows are not known, laws that fail in longer windows may stand for
+    what was not logged, and are no evidence of anything missing.
+    """
+    found, unseen = beyond_chance(found)
+    instead = None if found.complete else gain_over_named(found, say)
+    unlogged = found.problem.timing.fast_share < 1.0
+    if instead is not None or (unlogged and fails_in_longer_windows(found, unseen)):
+        found, unseen = found.parameters_alone(), None
+    return found, unseen, instead
 
 
 def _reason_of(judged: WindowVerdict) -> str | None:

@@ -15,7 +15,7 @@ def fast_loop_rig() -> Rig:
     return axis_rig(counts=COUNTS)
 
 
-def fast_loop_recording(*, seed: int, per_row: int = 8, rows: int = 1500) -> Recording:
+def fast_loop_recording(*, seed: int, per_row: int = 8, rows: int = 800) -> Recording:
     """A proportional-derivative loop around three sines, each row's first command in the log.
 
     Speed and angle of a tick follow exactly from its current and the wheel's inertia and damping.
