@@ -10,7 +10,7 @@ from rsea_core.files.csv_columns import unit_of
 from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.gear_mesh import as_effect
-from rsea_core.identify.multistep.command_timing import RowTimes
+from rsea_core.identify.multistep.command_timing import CommandTiming, RowTimes
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, MESH_DAMPER, RATIO
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
@@ -207,23 +207,7 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
             if text and abs(value) > (CLOCK_SHOWN if law.effect == CLOCK else OFFSET_SHOWN) * size:
                 found.append(Finding(kind=Kind.METHOD, text=text))
         at += count
-    timing = conclusion.problem.timing
-    if timing.rows is not RowTimes.LOGGED:
-        text = (
-            "the time stamps of these logs are uneven: they are the times of"
-            f" {timing.rows}; the simulation uses this"
-        )
-        found.append(Finding(kind=Kind.METHOD, text=text))
-    if timing.fast_share < 1.0:
-        text = (
-            "the loop ran faster than its log: the command of a row is one of many, and noisy as an"
-            " input; the simulation uses smoothed commands, and a torque of unknown shape beside"
-            " them is no evidence of missing physics (log the mean command of each row)"
-        )
-        found.append(Finding(kind=Kind.METHOD, text=text))
-    elif timing.linear:
-        text = "the command moves linearly from row to row of these logs; it is simulated so"
-        found.append(Finding(kind=Kind.METHOD, text=text))
+    found += _timing_findings(conclusion.problem.timing)
     found += _zeros(conclusion)
     meshes = any(law.effect == MESH_DAMPER for law in conclusion.fit.hypothesis.laws)
     if meshes:
@@ -256,6 +240,25 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
         )
         found.append(Finding(kind=Kind.METHOD, text=text))
     return found
+
+
+def _timing_findings(timing: CommandTiming) -> list[Finding]:
+    """How the commands and rows of the logs are simulated, where it is not as the log has them."""
+    texts = []
+    if timing.rows is not RowTimes.LOGGED:
+        texts.append(
+            "the time stamps of these logs are uneven: they are the times of"
+            f" {timing.rows}; the simulation uses this"
+        )
+    if timing.fast_share < 1.0:
+        texts.append(
+            "the loop ran faster than its log: the command of a row is one of many, and noisy as an"
+            " input; the simulation uses smoothed commands, and a torque of unknown shape beside"
+            " them is no evidence of missing physics (log the mean command of each row)"
+        )
+    elif timing.linear:
+        texts.append("the command moves linearly from row to row of these logs; it is simulated so")
+    return [Finding(kind=Kind.METHOD, text=text) for text in texts]
 
 
 def _zeros(conclusion: WindowVerdict) -> list[Finding]:

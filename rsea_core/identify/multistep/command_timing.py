@@ -109,7 +109,7 @@ def mean_commands(command: NDArray, fast_share: float) -> NDArray:
     """
     n = len(command)
     line = np.linspace(command[0], command[-1], n)
-    waves = dct(command - line, norm="ortho")
+    spectrum = dct(command - line, norm="ortho")
     roughness = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) ** 4
 
     def passed(log_weight: float) -> NDArray:
@@ -117,10 +117,10 @@ def mean_commands(command: NDArray, fast_share: float) -> NDArray:
 
     def validation(log_weight: float) -> float:
         share = passed(log_weight)
-        return float(np.sum(((1.0 - share) * waves) ** 2) / (n - np.sum(share)) ** 2)
+        return float(np.sum(((1.0 - share) * spectrum) ** 2) / (n - np.sum(share)) ** 2)
 
     best = min(np.arange(*LOG_WEIGHTS), key=validation)
-    slow = line + idct(passed(best) * waves, norm="ortho")
+    slow = line + idct(passed(best) * spectrum, norm="ortho")
     return slow + fast_share * (command - slow)
 
 

@@ -1,4 +1,4 @@
-"""Loops that run faster than their log: noisy commands are smoothed, and no constant is bent."""
+"""Loops that run faster than their log: noisy commands are smoothed, constants not biased."""
 
 import numpy as np
 import pytest
@@ -72,11 +72,11 @@ def test_a_sound_axis_in_a_loop_faster_than_its_log_lacks_no_physics(tmp_path):
     assert found.conclusion.problem.timing.fast_share == FAST_SHARE
     moved = found.conclusion.fit.x[: len(found.conclusion.problem.nominals)]
     assert np.max(np.abs(moved)) < 2.0
-    assert any("faster than its log" in note.text for note in found.conclusion.notes)
+    assert any("faster than its log" in note.text for note in found.findings)
 
 
 @pytest.mark.parametrize("timing", [CommandTiming(linear=True), None], ids=["logged", "chosen"])
-def test_noisy_commands_of_the_log_bend_the_torque_constant_and_smoothed_ones_do_not(
+def test_noisy_commands_of_the_log_bias_the_torque_constant_and_smoothed_ones_do_not(
     tmp_path, timing
 ):
     case = axis_case(tmp_path, fast_loop_recording(seed=1), rig=fast_loop_rig())
