@@ -250,7 +250,7 @@ def _timing_findings(timing: CommandTiming) -> list[Finding]:
             "the time stamps of these logs are uneven: they are the times of"
             f" {timing.rows}; the simulation uses this"
         )
-    if timing.fast_share < 1.0:
+    if timing.smooth:
         texts.append(
             "the loop ran faster than its log: the command of a row is one of many, and noisy as an"
             " input; the simulation uses smoothed commands, and a torque of unknown shape beside"

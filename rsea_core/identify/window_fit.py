@@ -104,7 +104,7 @@ def strained_value(problem: MultistepProblem, fit: FoundFit) -> Nominal | None:
     count: a command that moves within rows looks the same. Where the commands of the rows are not
     known, a value that moved is no evidence of what is missing.
     """
-    if problem.timing.fast_share < 1.0:
+    if problem.timing.smooth:
         return None
     moved = np.abs(fit.x[: len(problem.nominals)]) * problem.stated
     nominal = problem.values(fit.hypothesis, fit.x)[0]

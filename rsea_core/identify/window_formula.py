@@ -150,7 +150,7 @@ def unnamed_formula(
     """
     if instead is not None:
         return None, instead
-    if found.problem.timing.fast_share < 1.0 and not _beyond_spring(found, shape):
+    if found.problem.timing.smooth and not _beyond_spring(found, shape):
         return None, None
     if found.steps:
         return shape, None

@@ -92,7 +92,7 @@ class WindowVerdict(Conclusion):
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
-        self.dependent &= not found.sound and self.problem.timing.fast_share == 1.0
+        self.dependent &= not found.sound and not self.problem.timing.smooth
         self.reason = _reason_of(self)
         self.verdict = self._verdict()
 
@@ -320,7 +320,7 @@ def _with_evidence(
     """
     found, unseen = beyond_chance(found)
     instead = None if found.complete else gain_over_named(found, say)
-    unlogged = found.problem.timing.fast_share < 1.0
+    unlogged = found.problem.timing.smooth
     if instead is not None or (unlogged and fails_in_longer_windows(found, unseen)):
         found, unseen = found.parameters_alone(), None
     return found, unseen, instead

@@ -54,6 +54,11 @@ class CommandTiming:
     rows: RowTimes = RowTimes.LOGGED
     fast_share: float = 1.0
 
+    @property
+    def smooth(self) -> bool:
+        """Whether commands are smoothed: those that acted within rows are not in the log."""
+        return self.fast_share < 1.0
+
 
 AS_LOGGED = CommandTiming()
 
@@ -82,9 +87,9 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
                  for r in driven)  # fmt: skip
     rows = [t for t in RowTimes if uneven and t is not timing.rows]
     found = [replace(timing, rows=t) for t in rows]
-    plain = (False, True) if timing.fast_share < 1.0 else (not timing.linear,)
+    plain = (False, True) if timing.smooth else (not timing.linear,)
     found += [replace(timing, linear=x, fast_share=1.0) for x in plain]
-    if timing.fast_share == 1.0 and any(turns_often(r[r.command_name]) for r in driven):
+    if not timing.smooth and any(turns_often(r[r.command_name]) for r in driven):
         found.append(replace(timing, linear=True, fast_share=FAST_SHARE))
     return found
 

@@ -214,7 +214,7 @@ def experiment(
     numbers = replay.numbers(model)
     cycle = _cycle_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
     finer, name = 1, inputs.command_name
-    if timing.fast_share < 1.0 and name is not None and turns_often(getattr(inputs, name)):
+    if timing.smooth and name is not None and turns_often(getattr(inputs, name)):
         means = mean_commands(getattr(inputs, name), timing.fast_share)
         inputs = replace(inputs, **{name: means})
     if timing.linear and r.load.kind != "imposed" and r.command_name:

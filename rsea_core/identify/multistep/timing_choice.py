@@ -70,7 +70,7 @@ def parameters_with_timing(
         if len(ends) > 1 and _behind(ends[1], problem) > UNLIKELY_TIMING:
             continue
         ends.append(parameters(problem, h, say, output_errors=True))
-        if each.fast_share < 1.0:  # noisy commands make output errors large
+        if each.smooth:  # noisy commands make output errors large
             ends.append(parameters(problem, h, say))
     return best_of(*ends)
 
@@ -118,7 +118,7 @@ def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estim
         fit = other.fit(h, fit.x)
         better = fit.cost < base.cost - least
     hold = "linear" if timing.linear else "held"
-    if timing.fast_share < 1.0:
+    if timing.smooth:
         hold += f", {timing.fast_share:g} of its fast part"
     gain = base.cost - fit.cost
     say(f"command {hold}, stamps are times of {timing.rows}: {gain:.1f} units likelier")

@@ -60,9 +60,13 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
             for j, p in enumerate(conclusion.problem.nominals)
             if abs(conclusion.fit.x[j]) > 0.5
         ]
-        return (
-            "The nominal model with other values explains the recordings; no missing physics."
-            + (f" Moved most: {', '.join(moved[:4])}." if moved else "")
+        torque = conclusion.unknown_torque
+        what = (
+            "explains the recordings; no missing physics." if torque is None
+            else f"and {torque} explain the recordings; no missing physics was found."
+        )  # fmt: skip
+        return f"The nominal model with other values {what}" + (
+            f" Moved most: {', '.join(moved[:4])}." if moved else ""
         )
     without = _without_law(conclusion)
     if without is not None:
