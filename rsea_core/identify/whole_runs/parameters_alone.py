@@ -54,5 +54,4 @@ def step_error(own: Estimator, finer: Estimator, fit: Estimate) -> float:
     """Largest root mean square [noise deviations] by which other steps change a reading's error."""
     trial = [(fit.hypothesis, fit.x)]
     pairs = zip(own.innovations(trial), finer.innovations(trial), strict=True)
-    changes = [np.sqrt(np.mean((e[0] - f[0]) ** 2, axis=0)) for e, f in pairs]
-    return float(np.max(changes))
+    return max(float(np.sqrt(np.max(np.mean((e[0] - f[0]) ** 2, axis=0)))) for e, f in pairs)

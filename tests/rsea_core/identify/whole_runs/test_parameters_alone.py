@@ -48,3 +48,11 @@ def test_steps_are_shortened_until_they_no_longer_cause_the_misfit(precise):
         finer, finer.problem.steps._replace(fineness=0.5 * finer.problem.steps.fineness)
     )
     assert step_error(finer, half, fit) < step_error(own, finer, fit)
+
+
+def test_recordings_may_have_different_readings(tmp_path):
+    given, other = (axis_recording(seed=s) for s in (3, 4))
+    both = {**other.columns, "load_angle_rad": other["motor_angle_rad"]}
+    _, own, plain = searched_axis(tmp_path, given, replace(other, columns=both))
+    half = in_steps(own, own.problem.steps._replace(fineness=0.5))
+    assert 0.0 < step_error(own, half, plain) < 1.0
