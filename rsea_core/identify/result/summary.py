@@ -89,13 +89,17 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     of_each = [confidence.get(law.effect, 0.0) for law in laws]
     faint = [j for j, each in zip(own, of_each, strict=True) if each < CLAIMED]
     likely = [j for j, each in zip(own, of_each, strict=True) if NEAR <= each < CLAIMED]
-    less = ""
-    if 0 < len(faint) < len(own):
+    less, missing = "", "Missing physics"
+    if faint and len(faint) == len(own):
+        missing += " of uncertain name"
+        others = [n for e in conclusion.effects() for n in e["class"] if n not in confidence]
+        what = ", or ".join([what, *dict.fromkeys(others)])
+    elif faint:
         what = _listed([_named(conclusion, j) for j in own if j not in faint])
         named = "the laws found explain"
         if likely:
             less = f" Less sure: {_listed([_named(conclusion, j) for j in likely])}."
-    return f"Missing physics: {what}; {named} {share} of what re-estimated parameters leave.{less}"
+    return f"{missing}: {what}; {named} {share} of what re-estimated parameters leave.{less}"
 
 
 def _without_law(conclusion: ReportedDiagnosis) -> str | None:

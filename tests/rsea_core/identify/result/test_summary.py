@@ -1,4 +1,4 @@
-"""The summary states claimed effects first, likely ones as less sure, and no others."""
+"""The summary states claimed effects first, likely ones as less sure, and no others as certain."""
 
 from types import SimpleNamespace
 
@@ -17,7 +17,8 @@ def conclusion(*confidences):
     """A diagnosis of two effects without a sentence of their own."""
     names = ("effect-a", "effect-b")
     laws = tuple(law(name) for name in names)
-    effects = [{"name": n, "confidence": c} for n, c in zip(names, confidences, strict=True)]
+    effects = [{"name": n, "confidence": c, "class": [n, "effect-c"]}
+               for n, c in zip(names, confidences, strict=True)]  # fmt: skip
     return SimpleNamespace(
         verdict="missing-physics", question=None, residual=None, unbalance=None, nearest=(),
         restored_constants=(), fit=SimpleNamespace(hypothesis=Hypothesis(laws=laws), x=None),
@@ -47,3 +48,9 @@ def test_an_effect_that_hardly_counts_is_not_mentioned():
     text = summary_of(conclusion(0.9, 0.02))
     assert "effect-b" not in text
     assert "the laws found explain 90 %" in text
+
+
+def test_effects_that_are_not_claimed_are_stated_with_the_names_that_explain_as_much():
+    text = summary_of(conclusion(0.49, 0.3))
+    assert text.startswith("Missing physics of uncertain name: effect-a (of a test: size 1) and ")
+    assert ", or effect-c; together they explain 90 %" in text
