@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 VERDICTS = {
     "no-mismatch": "The model explains these recordings",
-    "parameters-only": "The model is right, its parameters are not",
+    "parameters-only": "The model explains these recordings with other values",
     "missing-physics": "Physics is missing",
     "unexplained": "A mismatch that no known effect explains",
     "insufficient-data": "These recordings are not sufficient",
