@@ -252,9 +252,10 @@ def _timing_findings(timing: CommandTiming) -> list[Finding]:
         )
     if timing.smooth:
         texts.append(
-            "the loop ran faster than its log: the command of a row is one of many, and noisy as an"
-            " input; the simulation uses smoothed commands, and a torque of unknown shape beside"
-            " them is no evidence of missing physics (log the mean command of each row)"
+            "commands in the log do not act as logged, as if their loop ran faster than the log"
+            " and a row held one of several commands; the simulation uses smoothed commands. With"
+            " them, an unknown torque is no evidence of missing physics: log the mean command of"
+            " each row"
         )
     elif timing.linear:
         texts.append("the command moves linearly from row to row of these logs; it is simulated so")

@@ -101,8 +101,8 @@ def strained_value(problem: MultistepProblem, fit: FoundFit) -> Nominal | None:
     """The stated value from which a fit went furthest (a damping: upwards), if too far.
 
     An inductance that changes the winding's time constant by a small share of a row does not
-    count: a command that moves within rows looks the same. Where the commands of the rows are not
-    known, a value that moved is no evidence of what is missing.
+    count: a command that moves within rows looks the same. None where commands are smoothed:
+    commands that the log lacks may have moved the value.
     """
     if problem.timing.smooth:
         return None

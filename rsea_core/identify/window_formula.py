@@ -140,8 +140,9 @@ def unnamed_formula(
     """What has no name: its shape, and a formula of the command if that predicts, or of the motion.
 
     A formula of the command takes the place of the shape; beside laws there is none. Where
-    parameters leave little more than noise, that formula alone is tried. A torque on the body that
-    the command moves is none where the commands of the rows are not known.
+    parameters leave little more than noise, that formula alone is tried. Where commands are
+    smoothed, a torque on the body that they move is not reported: commands that the log lacks may
+    cause it.
 
     Parameters
     ----------

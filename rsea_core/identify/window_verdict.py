@@ -65,7 +65,7 @@ class WindowVerdict(Conclusion):
     """Everything that is said of one case, of a multistep search."""
 
     def __init__(self, found: Found, recorded: Case, say: Callable[[str], None] = lambda _: None):
-        found, self.held_out, instead = _with_evidence(found, say)
+        found, self.held_out, instead = with_evidence(found, say)
         self.found, self.problem = found, found.problem
         self.case, self.recorded = self.problem.case, recorded
         plain = fit_of(found.base_estimator, found.base)
@@ -310,18 +310,18 @@ class WindowVerdict(Conclusion):
         return "after re-estimating parameters, in " + ", ".join(named)
 
 
-def _with_evidence(
+def with_evidence(
     found: Found, say: Callable[[str], None]
 ) -> tuple[Found, HeldOut | None, CommandFormula | None]:
     """The laws that there is evidence of, their gain held out, and a formula instead of a law.
 
-    Where the commands of the rows are not known, laws that fail in longer windows may stand for
-    what was not logged, and are no evidence of anything missing.
+    Where commands are smoothed, laws that fail in longer windows are dropped: they may describe
+    commands that the log lacks.
     """
     found, unseen = beyond_chance(found)
     instead = None if found.complete else gain_over_named(found, say)
-    unlogged = found.problem.timing.smooth
-    if instead is not None or (unlogged and fails_in_longer_windows(found, unseen)):
+    smooth = found.problem.timing.smooth
+    if instead is not None or (smooth and fails_in_longer_windows(found, unseen)):
         found, unseen = found.parameters_alone(), None
     return found, unseen, instead
 

@@ -46,8 +46,8 @@ class CommandTiming:
     Attributes
     ----------
     fast_share : float
-        Of what smoothing takes from a command that turns often (`turns_often`), the share that
-        acts: 1 if commands are applied as the log has them.
+        Share of a command's fast part that acts, where the command turns often (`turns_often`); the
+        fast part is what smoothing removes (`mean_commands`). 1: commands act as logged.
     """
 
     linear: bool = False
@@ -56,7 +56,7 @@ class CommandTiming:
 
     @property
     def smooth(self) -> bool:
-        """Whether commands are smoothed: those that acted within rows are not in the log."""
+        """Whether commands are smoothed."""
         return self.fast_share < 1.0
 
 
@@ -95,22 +95,26 @@ def timings(case: Case, timing: CommandTiming) -> list[CommandTiming]:
 
 
 def turns_often(command: NDArray) -> bool:
-    """Whether a command (n,) rises after it fell, or falls after it rose, in many of its rows."""
+    """Whether the change of a command (n,) reverses its sign in more than `TURNS` of the rows."""
     steps = np.diff(command)
     return bool(np.mean(steps[1:] * steps[:-1] < 0.0) > TURNS) if len(steps) > 1 else False
 
 
 def mean_commands(command: NDArray, fast_share: float) -> NDArray:
-    """The means over rows that a command (n,), one value of each row, is an estimate of.
+    """Estimated mean of each row's commands from one of them (n,): smoothed, plus a share.
 
-    A loop that runs faster than its log commands many values in a row. The one in the log holds
-    what the encoder's counts and the derivative gave in that moment: as an input it is noisy, and a
-    fit that takes it for the applied command finds too small a gain (errors in variables).
-    Of what a smoother takes away only a share acts. The smoother penalises fourth differences, with
-    the weight of least generalised cross-validation, in the basis of cosines: Garcia, Computational
-    Statistics & Data Analysis 54 (2010) 1167, eqs. 8, 13 and 14, of second differences there, which
-    attenuate the fastest motion that they pass. The line through first and last value is left
-    out, whose ends a cosine does not follow.
+    A loop that runs faster than its log gives many commands in a row. The logged one contains the
+    quantisation noise of its own encoder sample, amplified by the derivative: a fit that uses it as
+    the applied command underestimates the gain (errors in variables). The smoother penalises fourth
+    differences, with the weight of smallest generalised cross-validation, by a cosine transform:
+    Garcia, Computational Statistics & Data Analysis 54 (2010) 1167, eqs. 8, 13 and 14. (Second
+    differences, as there, attenuate the fastest motion in the command.) The straight line through
+    the first and the last value is removed before, because the transform implies level ends.
+
+    Parameters
+    ----------
+    fast_share : float
+        Share of what the smoother removes, that is added again.
     """
     n = len(command)
     line = np.linspace(command[0], command[-1], n)

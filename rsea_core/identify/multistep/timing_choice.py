@@ -70,7 +70,7 @@ def parameters_with_timing(
         if len(ends) > 1 and _behind(ends[1], problem) > UNLIKELY_TIMING:
             continue
         ends.append(parameters(problem, h, say, output_errors=True))
-        if each.smooth:  # noisy commands make output errors large
+        if each.smooth:  # from output errors the noise may end in a local maximum
             ends.append(parameters(problem, h, say))
     return best_of(*ends)
 

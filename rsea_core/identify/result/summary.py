@@ -92,8 +92,11 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
     less, missing = "", "Missing physics"
     if faint and len(faint) == len(own):
         missing += " of uncertain name"
-        others = [n for e in conclusion.effects() for n in e["class"] if n not in confidence]
+        laws_found = [e for e in conclusion.effects() if e["confidence"] < CLAIMED]
+        others = [n for e in laws_found for n in e["class"] if n not in confidence]
         what = ", or ".join([what, *dict.fromkeys(others)])
+        sure = [name for name, each in confidence.items() if each >= CLAIMED]
+        missing = f"Missing physics: {_listed(sure)}. {missing}" if sure else missing
     elif faint:
         what = _listed([_named(conclusion, j) for j in own if j not in faint])
         named = "the laws found explain"

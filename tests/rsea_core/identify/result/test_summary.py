@@ -13,12 +13,12 @@ def law(effect):
     return SimpleNamespace(effect=effect, law="of a test", subsystem="load", nuisance=False)
 
 
-def conclusion(*confidences):
-    """A diagnosis of two effects without a sentence of their own."""
+def conclusion(*confidences, more=()):
+    """A diagnosis of two effects without a sentence of their own, and more that are no laws."""
     names = ("effect-a", "effect-b")
     laws = tuple(law(name) for name in names)
     effects = [{"name": n, "confidence": c, "class": [n, "effect-c"]}
-               for n, c in zip(names, confidences, strict=True)]  # fmt: skip
+               for n, c in zip(names, confidences, strict=True)] + [*more]  # fmt: skip
     return SimpleNamespace(
         verdict="missing-physics", question=None, residual=None, unbalance=None, nearest=(),
         restored_constants=(), fit=SimpleNamespace(hypothesis=Hypothesis(laws=laws), x=None),
@@ -54,3 +54,9 @@ def test_effects_that_are_not_claimed_are_stated_with_the_names_that_explain_as_
     text = summary_of(conclusion(0.49, 0.3))
     assert text.startswith("Missing physics of uncertain name: effect-a (of a test: size 1) and ")
     assert ", or effect-c; together they explain 90 %" in text
+
+
+def test_a_claimed_effect_without_a_law_is_stated_before_laws_of_uncertain_name():
+    late = {"name": "drive-delay", "confidence": 0.95, "class": ["drive-delay"]}
+    text = summary_of(conclusion(0.4, 0.3, more=[late]))
+    assert text.startswith("Missing physics: drive-delay. Missing physics of uncertain name: ")
