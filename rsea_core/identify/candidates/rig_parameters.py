@@ -38,6 +38,7 @@ ONE_BODY = (  # before and behind the gear: only their sum is seen
     ("motor_viscous_Nms_per_rad", "output_viscous_Nms_per_rad"),
 )
 PARTNER = {own: other for pair in ONE_BODY for own, other in (pair, pair[::-1])}
+DAMPINGS = (*ONE_BODY[1], "load_viscous_Nms_per_rad")
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
 UNKNOWN = 5.0  # times as much where the file leaves the damping out
 

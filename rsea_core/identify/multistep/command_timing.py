@@ -109,7 +109,8 @@ def mean_commands(command: NDArray, fast_share: float) -> NDArray:
     differences, with the weight of smallest generalised cross-validation, by a cosine transform:
     Garcia, Computational Statistics & Data Analysis 54 (2010) 1167, eqs. 8, 13 and 14. (Second
     differences, as there, attenuate the fastest motion in the command.) The straight line through
-    the first and the last value is removed before, because the transform implies level ends.
+    the first and the last value is removed before, because the transform implies level ends. The
+    result stays within the log's commands: a smoother overshoots beside a command at its limit.
 
     Parameters
     ----------
@@ -130,7 +131,7 @@ def mean_commands(command: NDArray, fast_share: float) -> NDArray:
 
     best = min(np.arange(*LOG_WEIGHTS), key=validation)
     slow = line + idct(passed(best) * spectrum, norm="ortho")
-    return slow + fast_share * (command - slow)
+    return np.clip(slow + fast_share * (command - slow), np.min(command), np.max(command))
 
 
 def current_is_commanded(case: Case) -> bool:

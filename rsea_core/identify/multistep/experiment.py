@@ -20,7 +20,8 @@ from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
 from rsea_core.errors import RecordingError
-from rsea_core.identify.candidates.rig_parameters import Nominal
+from rsea_core.identify.candidates.rig_parameters import DAMPINGS, Nominal
+from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
 from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
 from rsea_core.identify.fitting.problem import (
     READ,
@@ -324,7 +325,8 @@ class MultistepProblem(Problem):
         """A damping that the rig file gives as none or leaves out, free upwards in its own scale.
 
         That of the machine: the inertia that it slows down, over the time that the motion shows,
-        and the damping that the back-EMF gives to the body that the motor moves.
+        and the damping that the back-EMF gives to the body that the motor moves. Where the file
+        states no damping at all, the one that would take all of the drive's torque, if larger.
         """
         if not _free(n):
             return n
@@ -340,7 +342,20 @@ class MultistepProblem(Problem):
             electric = plant.torque_per_ampere * plant.volts_per_speed / plant.resistance
         side = ratio**2 if n.key.startswith("motor") else 1.0
         rate = max(_motion_rate(e.recording) for e in self.fitted)
-        return replace(n, tolerance=DAMPED * (inertia * rate + electric) / side)
+        scale = max(DAMPED * (inertia * rate + electric), self._damping_of_drive())
+        return replace(n, tolerance=scale / side)
+
+    def _damping_of_drive(self) -> float:
+        """Damping at the output that takes the drive's torque at the usual speed.
+
+        0 where the rig file states any damping, or nothing drives the machine.
+        """
+        rig = self.case.rig
+        stated = any(getattr(rig, key) is not None for key in DAMPINGS)
+        if stated or all(r.command_name is None for r in self.case.identification):
+            return 0.0
+        usual = own_magnitudes(self.case)
+        return usual.motor_torque_Nm * (rig.gear_ratio or 1.0) / usual.speed_rad_per_s
 
     def bounds(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
         """Lowest and highest unknowns: what is stated stays near, no damping below zero."""

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.multistep.experiment import DAMPED, MultistepProblem
+from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from tests.cases.one_axis import ROW_s, axis_case, axis_recording, axis_rig
 
 RATIO, CONSTANT, OHM = 70.0, 0.008, 3.0
+DAMPING = 1.0  # Nms/rad of the overdamped axis: its inertia stops in a fiftieth of a second
 SERVO = Rig(
     name="servo", parts=("drive", "gear", "load"), supply_voltage_V=15.0,
     torque_constant_Nm_per_A=CONSTANT, back_emf_constant_Vs_per_rad=CONSTANT,
@@ -43,6 +45,23 @@ def test_a_damping_left_out_may_be_as_large_as_that_of_the_back_emf_on_the_same_
     stiff = replace(SERVO, motor_inertia_kgm2=5e-5)
     ratio = load_damping(tmp_path, stiff, "current_command_A") / by_current
     assert ratio == pytest.approx((1e-3 + 5e-5 * RATIO**2) / whole)
+
+
+def test_damping_that_no_file_states_may_take_all_of_the_drives_torque(tmp_path):
+    """An overdamped axis whose file states no damping: a value, not missing physics."""
+    damped = replace(axis_rig(), load_viscous_Nms_per_rad=DAMPING)
+    unstated = replace(damped, load_viscous_Nms_per_rad=None)
+    case = axis_case(tmp_path, axis_recording(seed=8, rig=damped), rig=unstated)
+    scale = {n.key: n.tolerance for n in MultistepProblem(case).nominals}
+    recording = case.identification[0]
+    torque = 0.5 * np.std(recording["current_command_A"])
+    speed = np.std(np.diff(recording["motor_angle_rad"])) / ROW_s
+    assert scale["load_viscous_Nms_per_rad"] == pytest.approx(torque / speed, rel=0.2)
+    found = diagnose_windows(case, quick=True)
+    assert found.document["effects"] == []
+    values = found.conclusion.nominal
+    total = sum(value for key, value in values.items() if key.endswith("viscous_Nms_per_rad"))
+    assert total == pytest.approx(DAMPING, rel=0.05)
 
 
 def test_a_locked_load_stands_at_the_mean_of_its_readings(tmp_path):

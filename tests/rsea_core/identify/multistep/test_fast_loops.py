@@ -27,6 +27,7 @@ from tests.cases.one_axis import axis_case
 
 ROW_s, N = 0.02, 400
 GRID = ROW_s * np.arange(N)
+NOISE = np.random.default_rng(8).standard_normal(N)
 
 
 def test_smoothed_commands_are_an_unbiased_regressor_where_logged_ones_are_not():
@@ -48,6 +49,12 @@ def test_a_share_of_what_smoothing_removes_is_added_again():
 
 def test_a_straight_command_is_its_own_mean():
     np.testing.assert_allclose(mean_commands(3.0 - GRID, 0.0), 3.0 - GRID, rtol=0.0, atol=1e-12)
+
+
+def test_smoothed_commands_stay_within_those_of_the_log():
+    """A command at its limit: a smoother overshoots beside it, and a duty of 1.07 is none."""
+    limited = np.clip(3.0 * np.sin(2.0 * np.pi * GRID) + NOISE, -1.0, 1.0)
+    assert np.max(np.abs(mean_commands(limited, FAST_SHARE))) <= 1.0
 
 
 @pytest.mark.parametrize(
