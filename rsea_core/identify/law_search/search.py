@@ -202,6 +202,7 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
     base = found.best
     worth = _worth_over_parent(found, finished)
     richest: set[str] = set()
+    refused = 0
     if not quick:
         finished, richest = with_richer_rivals(finished, base, laws, worth, say)
     while finished:
@@ -216,6 +217,8 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
         say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
         if ratio >= (LEAST_RATIO if not once else _least_pulse_ratio(c)):
             break
+        found.screened.insert(refused, c)  # nearest names: what gains most, though unevenly
+        refused += 1
     else:
         return None
     found.estimator, found.best = resmoothed_fit(own, fit)
