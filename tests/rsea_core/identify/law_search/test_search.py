@@ -15,7 +15,8 @@ def test_the_laws_that_gain_most_are_the_nearest_names_also_if_they_gain_unevenl
     case = axis_case(tmp_path, axis_recording(LoadFriction(coulomb_Nm=0.1), seed=3), rig=axis_rig())
     texts: list[str] = []
     found = search.begun(case, None, texts.append, quick=True)
-    search.add_all(found, search.laws_of(found), texts.append, quick=True)
+    laws = [law for law in search.laws_of(found) if "friction" in law.effect]
+    search.add_all(found, laws, texts.append, quick=True)
     refused = [m[1] for text in texts if (m := re.match(r" *best (.*): gain", text))]
     assert found.steps == []
     assert len(refused) > 1
