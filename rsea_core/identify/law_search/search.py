@@ -217,7 +217,8 @@ def _next_law(found: Found, laws: Sequence[Law], say, *, quick: bool) -> Step | 
         say(f"  best {c.law.key}: gain {gain_of(own, base, fit):.1f}, ratio {ratio:.1f}")
         if ratio >= (LEAST_RATIO if not once else _least_pulse_ratio(c)):
             break
-        found.screened.insert(refused, c)  # nearest names: what gains most, though unevenly
+        if not found.steps:  # nearest names: what gains most, though unevenly
+            found.screened.insert(refused, c)
         refused += 1
     else:
         return None

@@ -110,7 +110,7 @@ def mean_commands(command: NDArray, fast_share: float) -> NDArray:
     Garcia, Computational Statistics & Data Analysis 54 (2010) 1167, eqs. 8, 13 and 14. (Second
     differences, as there, attenuate the fastest motion in the command.) The straight line through
     the first and the last value is removed before, because the transform implies level ends. The
-    result stays within the log's commands: a smoother overshoots beside a command at its limit.
+    result stays within the log's commands: a smoother overshoots next to a command at its limit.
 
     Parameters
     ----------

@@ -326,7 +326,7 @@ class MultistepProblem(Problem):
 
         That of the machine: the inertia that it slows down, over the time that the motion shows,
         and the damping that the back-EMF gives to the body that the motor moves. Where the file
-        states no damping at all, the one that would take all of the drive's torque, if larger.
+        states no damping at all, the one that balances the drive's torque, if larger.
         """
         if not _free(n):
             return n
@@ -346,7 +346,7 @@ class MultistepProblem(Problem):
         return replace(n, tolerance=scale / side)
 
     def _damping_of_drive(self) -> float:
-        """Damping at the output that takes the drive's torque at the usual speed.
+        """Damping at the output that balances the drive's torque at the usual speed.
 
         0 where the rig file states any damping, or nothing drives the machine. (A damping that is
         stated as zero keeps the narrow scale: with the wide one the hobby servo of

@@ -52,7 +52,7 @@ def test_a_straight_command_is_its_own_mean():
 
 
 def test_smoothed_commands_stay_within_those_of_the_log():
-    """A command at its limit: a smoother overshoots beside it, and a duty of 1.07 is none."""
+    """A command at its limit: a smoother overshoots next to it, and a duty of 1.07 is none."""
     limited = np.clip(3.0 * np.sin(2.0 * np.pi * GRID) + NOISE, -1.0, 1.0)
     assert np.max(np.abs(mean_commands(limited, FAST_SHARE))) <= 1.0
 
