@@ -167,10 +167,8 @@ def predicts_better(found: Found) -> bool:
     """Whether laws predict any reading of recordings held out better than parameters alone do.
 
     Windows are from one time scale long to the longest in which the machine is predictable; if that
-    is shorter, only these. A reading is predicted better if its root mean square error is below
-    `LESS_ERROR` of that of parameters alone and the mean difference of the windows' squared errors
-    exceeds `ERRORS_BEYOND` of its standard errors; with fewer than three windows, if the error is
-    below `FEW_WINDOWS_ERROR` of it. True too if no window is long enough to judge by.
+    is shorter, only these. A reading is predicted better if its error is lower beyond chance
+    (`lower_beyond_chance`). True too if no window is long enough to judge by.
     """
     unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
     longest = found.horizon or np.inf
@@ -194,7 +192,11 @@ def _long_enough(found: Found, experiments: list[Experiment], horizon: float) ->
 def lower_beyond_chance(new: NDArray, old: NDArray) -> bool:
     """Whether mean squared errors of windows (w,) are lower than others (w,) beyond chance.
 
-    True where only the new ones are finite.
+    The root mean square of the errors must be below `LESS_ERROR` of the others', and the mean
+    difference of the windows, relative to the sum of both, must exceed `ERRORS_BEYOND` of its
+    standard errors. Differences that are not relative have too large a standard error where one
+    window leaves the recording: it holds nearly all of the squared error. With fewer than three
+    windows the errors must be below `FEW_WINDOWS_ERROR`. True where only the new ones are finite.
     """
     if not np.all(np.isfinite(new)):
         return False
@@ -202,9 +204,10 @@ def lower_beyond_chance(new: NDArray, old: NDArray) -> bool:
         return True
     if len(old) < LEAST_WINDOWS:
         return bool(np.mean(new) < FEW_WINDOWS_ERROR**2 * np.mean(old))
-    standard_error = np.std(old - new, ddof=1) / len(old) ** 0.5
+    relative = (old - new) / np.maximum(old + new, np.finfo(float).tiny)
+    standard_error = np.std(relative, ddof=1) / len(old) ** 0.5
     lower = np.mean(new) < LESS_ERROR**2 * np.mean(old)
-    return bool(lower and np.mean(old - new) > ERRORS_BEYOND * standard_error)
+    return bool(lower and np.mean(relative) > ERRORS_BEYOND * standard_error)
 
 
 def _squared_errors(

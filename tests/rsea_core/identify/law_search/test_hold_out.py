@@ -148,6 +148,7 @@ OLD = np.array([4.0, 5.0, 6.0, 5.0])
         (0.92 * OLD, OLD, False),  # 0.96 of the root mean square error
         (0.5 * OLD[::-1] + [0.0, 0.0, 0.0, 8.0], OLD, False),  # one window is far worse
         (OLD * [0.1, 0.9, 1.1, 0.9], OLD, False),  # lower by chance
+        (0.3 * OLD * [1, 1, 1, 1e4], OLD * [1, 1, 1, 1e4], True),  # one window holds the error
         (0.3 * OLD[:2], OLD[:2], False),
         (0.2 * OLD[:2], OLD[:2], True),
         (OLD, OLD * np.inf, True),
