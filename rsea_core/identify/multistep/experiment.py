@@ -348,12 +348,12 @@ class MultistepProblem(Problem):
     def _damping_of_drive(self) -> float:
         """Damping at the output that balances the drive's torque at the usual speed.
 
-        0 where the rig file states any damping, or nothing drives the machine. (A damping that is
-        stated as zero keeps the narrow scale: with the wide one the hobby servo of
-        docs/real-recordings.md is predictable for 1.2 s, with the narrow one over all rows.)
+        0 where the rig file states a damping above zero, or nothing drives the machine. A file
+        whose dampings are all zero is a model without damping: nobody measured it as in one that
+        leaves them out, and both are diagnosed alike.
         """
         rig = self.case.rig
-        stated = any(getattr(rig, key) is not None for key in DAMPINGS)
+        stated = any(getattr(rig, key) for key in DAMPINGS)
         if stated or all(r.command_name is None for r in self.case.identification):
             return 0.0
         usual = own_magnitudes(self.case)

@@ -10,6 +10,7 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.kalman_filter import huber_weights
 
 LONGEST_STEP = 3.0
+LEAST_CURVATURE = 1e-9  # along directions that neither readings nor priors determine
 UNDAMPED = 1e-12  # damping of a step along directions that only the priors determine
 PROBE = 0.1  # share of such a step by which its second derivative is taken
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of such a step that are tried
@@ -56,7 +57,7 @@ def damped_step(x, A, g, damping, low, high) -> NDArray:
     trial = x
     for _ in range(3):
         B = A[np.ix_(use, use)]
-        B = B + damping * np.diag(np.diag(B)) + 1e-9 * np.eye(len(B))
+        B = B + damping * np.diag(np.diag(B)) + LEAST_CURVATURE * np.eye(len(B))
         d = -np.linalg.solve(B, g[use])
         largest = np.max(np.abs(d) / (LONGEST_STEP + np.abs(x[use])), initial=0.0)
         if largest > 1.0:
@@ -100,5 +101,6 @@ def curved(
         return []
     free = v != 0.0
     a = np.zeros(v.size)
-    a[free] = -tempering * np.linalg.solve(start.A[np.ix_(free, free)], rhs[free])
+    B = start.A[np.ix_(free, free)] + LEAST_CURVATURE * np.eye(np.count_nonzero(free))
+    a[free] = -tempering * np.linalg.solve(B, rhs[free])
     return [start.x + s * v + 0.5 * s**2 * a for s in SHARES]

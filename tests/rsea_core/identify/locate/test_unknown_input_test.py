@@ -56,8 +56,9 @@ def test_what_innovations_hardly_show_is_no_matter_of_values(tmp_path):
         misread(tmp_path, "torque_Nm", lambda t, c: 0.02 * np.sin(20.0 * t))  # its noise: 0.02
     )
     assert np.all(search.parameters.msni < NOISE_MSNI)
-    assert Conclusion(search).verdict == "unexplained"
-    assert location_of(Conclusion(search))["subsystem"] == "sensor:torque_Nm"
+    conclusion = Conclusion(search)
+    assert conclusion.verdict == "unexplained"
+    assert location_of(conclusion)["subsystem"] == "sensor:torque_Nm"
     search.effort = QUICK
     assert Conclusion(search).verdict in ("no-mismatch", "parameters-only")
 

@@ -60,3 +60,15 @@ def test_repeated_curved_steps_reach_the_lowest_point_of_the_valley():
 def test_a_failed_probe_gives_no_curved_step():
     start, v = begun(AT)
     assert not curved(start, v, innovations(AT), derivatives(AT), [np.array([[np.nan]])], 1.0)
+
+
+def test_an_unknown_that_neither_readings_nor_a_prior_determine_stays():
+    start, v = begun(AT)
+    at, moved = np.append(AT, 7.0), np.append(v, 1e-9)
+    A = np.zeros((3, 3))
+    A[:2, :2] = start.A
+    start = start._replace(x=at, A=A, g=np.append(start.g, 0.0))
+    columns = [np.concatenate([derivatives(AT)[0], np.zeros((1, 1, 1))])]
+    ends = curved(start, moved, innovations(AT), columns, innovations(AT + PROBE * v), 1.0)
+    assert ends
+    assert [end[2] for end in ends] == pytest.approx([7.0] * len(ends), abs=1e-8)
