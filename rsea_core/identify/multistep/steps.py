@@ -51,14 +51,17 @@ def correction(J: NDArray, moved: NDArray, change: NDArray) -> NDArray:
     return moved[:, None, None] * (rest / float(moved @ moved))
 
 
+def _solved(A: NDArray, b: NDArray, damping: float) -> NDArray:
+    """Solution (n,) of a damped system, regular where nothing determines an unknown."""
+    return np.linalg.solve(A + np.diag(damping * np.diag(A) + LEAST_CURVATURE), b)
+
+
 def damped_step(x, A, g, damping, low, high) -> NDArray:
     """A damped Gauss-Newton step within bounds: what a bound stops is left out."""
     use = np.ones(x.size, bool)
     trial = x
     for _ in range(3):
-        B = A[np.ix_(use, use)]
-        B = B + damping * np.diag(np.diag(B)) + LEAST_CURVATURE * np.eye(len(B))
-        d = -np.linalg.solve(B, g[use])
+        d = -_solved(A[np.ix_(use, use)], g[use], damping)
         largest = np.max(np.abs(d) / (LONGEST_STEP + np.abs(x[use])), initial=0.0)
         if largest > 1.0:
             d /= largest
@@ -101,6 +104,5 @@ def curved(
         return []
     free = v != 0.0
     a = np.zeros(v.size)
-    B = start.A[np.ix_(free, free)] + LEAST_CURVATURE * np.eye(np.count_nonzero(free))
-    a[free] = -tempering * np.linalg.solve(B, rhs[free])
+    a[free] = -tempering * _solved(start.A[np.ix_(free, free)], rhs[free], UNDAMPED)
     return [start.x + s * v + 0.5 * s**2 * a for s in SHARES]

@@ -72,3 +72,11 @@ def test_an_unknown_that_neither_readings_nor_a_prior_determine_stays():
     ends = curved(start, moved, innovations(AT), columns, innovations(AT + PROBE * v), 1.0)
     assert ends
     assert [end[2] for end in ends] == pytest.approx([7.0] * len(ends), abs=1e-8)
+
+
+def test_unknowns_that_large_derivatives_do_not_distinguish_give_finite_steps():
+    start, v = begun(AT)
+    steep = [np.full((2, 1, 1), 1e12)]
+    A, g = normal_equations(innovations(AT), steep)
+    ends = curved(start._replace(A=A, g=g), v, innovations(AT), steep, innovations(AT + v), 1.0)
+    assert np.all(np.isfinite(ends))
