@@ -51,9 +51,9 @@ def correction(J: NDArray, moved: NDArray, change: NDArray) -> NDArray:
     return moved[:, None, None] * (rest / float(moved @ moved))
 
 
-def _solved(A: NDArray, b: NDArray, damping: float) -> NDArray:
-    """Solution (n,) of a damped system, regular where nothing determines an unknown."""
-    return np.linalg.solve(A + np.diag(damping * np.diag(A) + LEAST_CURVATURE), b)
+def regular(A: NDArray, damping: float = UNDAMPED) -> NDArray:
+    """A damped Gauss-Newton matrix (n, n), regular where nothing determines an unknown."""
+    return A + np.diag(damping * np.diag(A) + LEAST_CURVATURE)
 
 
 def damped_step(x, A, g, damping, low, high) -> NDArray:
@@ -61,7 +61,7 @@ def damped_step(x, A, g, damping, low, high) -> NDArray:
     use = np.ones(x.size, bool)
     trial = x
     for _ in range(3):
-        d = -_solved(A[np.ix_(use, use)], g[use], damping)
+        d = -np.linalg.solve(regular(A[np.ix_(use, use)], damping), g[use])
         largest = np.max(np.abs(d) / (LONGEST_STEP + np.abs(x[use])), initial=0.0)
         if largest > 1.0:
             d /= largest
@@ -104,5 +104,5 @@ def curved(
         return []
     free = v != 0.0
     a = np.zeros(v.size)
-    a[free] = -tempering * _solved(start.A[np.ix_(free, free)], rhs[free], UNDAMPED)
+    a[free] = -tempering * np.linalg.solve(regular(start.A[np.ix_(free, free)]), rhs[free])
     return [start.x + s * v + 0.5 * s**2 * a for s in SHARES]
