@@ -231,17 +231,14 @@ class GearTransmissionError(Term):
     worm_third_phase_rad: float = _phase("worm", 3)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Amplitudes of wheel and worm: once a turn, or the first wave that there is.
+        """Amplitudes of the largest waves of wheel and worm.
 
-        The generator of a strain wave gear makes two waves a turn and none once.
+        The generator of a strain wave gear makes two waves a turn and hardly any once.
         """
         worm = (self.worm_amplitude_rad, self.worm_second_amplitude_rad,
                 self.worm_third_amplitude_rad)  # fmt: skip
-        wheel = self.wheel_amplitude_rad or self.wheel_second_amplitude_rad
-        return {
-            "wheel_amplitude_rad": wheel,
-            "worm_amplitude_rad": next((a for a in worm if a), 0.0),
-        }
+        wheel = (self.wheel_amplitude_rad, self.wheel_second_amplitude_rad)
+        return {"wheel_amplitude_rad": max(wheel), "worm_amplitude_rad": max(worm)}
 
     @property
     def error_at_zero_rad(self) -> float:

@@ -67,3 +67,11 @@ def test_the_energy_of_a_rigid_train_balances_with_the_error():
     supplied = np.max(np.abs(energy.supplied_J))
     assert supplied > 0.1
     assert np.max(np.abs(energy.imbalance_J())) < 1e-9 * supplied
+
+
+def test_the_largest_waves_are_the_amplitudes_reported():
+    wave_generator = GearTransmissionError(
+        wheel_amplitude_rad=5.5e-4, worm_amplitude_rad=2e-7, worm_second_amplitude_rad=1.6e-4
+    )
+    figures = {"wheel_amplitude_rad": 5.5e-4, "worm_amplitude_rad": 1.6e-4}
+    assert wave_generator.comparable() == figures
