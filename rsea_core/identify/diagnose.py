@@ -25,11 +25,17 @@ from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.numeric.threads import on_one_blas_thread
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Finding, Kind
 
 BENCH_ROW_s = 2.5e-3
 BENCH_RATIO = 20.0
 BENCH_COLUMNS = ("motor_angle_rad", "load_angle_rad")
 BETTER = 0.95  # free-run error over the other's, fitted and held-out recordings with equal weight
+WINDOWS_FAILED = Finding(
+    kind=Kind.METHOD,
+    text="the search in windows, which suits this machine, failed numerically: laws were judged by"
+    " free runs of whole recordings, which say less; please report the case",
+)
 PREDICTED = 0.02  # of the spread of recordings held out: no other search is needed below
 
 
@@ -88,7 +94,8 @@ def diagnose(
     except (np.linalg.LinAlgError, FloatingPointError) as numeric:
         say(f"windows: {numeric}; free runs instead")
         try:
-            return diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
+            found = diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
+            return found.having(WINDOWS_FAILED)
         except np.linalg.LinAlgError as again:
             text = f"{case.name}: no machine of rig.toml can be fitted to these recordings: {again}"
             raise RecordingError(text) from again

@@ -1,6 +1,6 @@
 """The result of a diagnosis."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.corrected_model import FoundModel
@@ -27,3 +27,8 @@ class Diagnosis(BriefRepr):
     model: FoundModel
     conclusion: Conclusion
     findings: tuple[Finding, ...] = ()
+
+    def having(self, finding: Finding) -> "Diagnosis":
+        """The same with a further finding."""
+        document = self.document | {"findings": [*self.document["findings"], finding.sentence()]}
+        return replace(self, document=document, findings=(*self.findings, finding))

@@ -3,9 +3,11 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from rsea_core.identify.diagnose import diagnose
+from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose
+from rsea_core.identify.result.diagnosis import Diagnosis
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 HERE = "rsea_core.identify.diagnose"
@@ -65,3 +67,18 @@ def test_complete_laws_of_windows_replace_those_of_free_runs_that_leave_much(
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
     assert diagnose(case) is opinions[taken]
+
+
+def test_a_search_in_windows_that_fails_is_stated_beside_what_free_runs_found(
+    tmp_path, monkeypatch
+):
+    def fails(*_, **__):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    runs = Diagnosis(document={"findings": ["first"]}, model=None, conclusion=None)
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", fails)
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: runs)
+    found = diagnose(axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig()))
+    assert found.document["findings"] == ["first", WINDOWS_FAILED.sentence()]
+    assert found.findings == (WINDOWS_FAILED,)
+    assert runs.document["findings"] == ["first"]
