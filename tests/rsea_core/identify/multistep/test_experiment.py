@@ -53,6 +53,9 @@ def test_damping_that_no_file_states_may_take_all_of_the_drives_torque(tmp_path)
     unstated = replace(damped, load_viscous_Nms_per_rad=None)
     case = axis_case(tmp_path, axis_recording(seed=8, rig=damped), rig=unstated)
     scale = {n.key: n.tolerance for n in MultistepProblem(case).nominals}
+    zero = replace(case, rig=replace(unstated, load_viscous_Nms_per_rad=0.0))
+    as_zero = {n.key: n.tolerance for n in MultistepProblem(zero).nominals}
+    assert as_zero["load_viscous_Nms_per_rad"] == scale["load_viscous_Nms_per_rad"]
     recording = case.identification[0]
     torque = 0.5 * np.std(recording["current_command_A"])
     speed = np.std(np.diff(recording["motor_angle_rad"])) / ROW_s
