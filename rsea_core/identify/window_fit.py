@@ -30,7 +30,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretche
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
-from rsea_core.identify.multistep.steps import normal_equations, regular
+from rsea_core.identify.multistep.steps import normal_equations
 from rsea_core.machine.inputs import POSITION_COMMAND
 
 DAMPING, INDUCTANCE = "viscous_Nms_per_rad", "terminal_inductance_H"
@@ -85,7 +85,7 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
         parts = (block == b for b in range(block[-1] + 1))
         stretches += [normal_equations([e[own]], [J[:, own]]) for own in parts]
         recordings.append(normal_equations([e], [J]))
-    inverse = np.linalg.inv(regular(sum(A for A, _ in recordings) + prior))
+    inverse = np.linalg.inv(sum(A for A, _ in recordings) + prior + 1e-9 * np.eye(fit.x.size))
     middle = prior + sum(np.outer(g, g) for _, g in stretches)
     white = inverse * max(float(np.mean([np.mean(huber_squares(e)) for e in level])), 1.0)
     apart = [

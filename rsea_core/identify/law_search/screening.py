@@ -16,7 +16,6 @@ from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.kalman_filter import huber_weights
-from rsea_core.identify.multistep.steps import regular
 from rsea_core.identify.multistep.tracks import Track
 
 BATCH = 24  # trials predicted at once
@@ -78,7 +77,8 @@ class Projection:
         self.J = J * self.root
         self.target = -e * self.root
         centre, weight = estimator.problem.prior(fit.hypothesis)
-        self.L = np.linalg.cholesky(regular(self.J @ self.J.T + np.diag(weight**2)))
+        A = self.J @ self.J.T + np.diag(weight**2 + 1e-9)
+        self.L = np.linalg.cholesky(A)
         g = self.J @ self.target - weight**2 * (fit.x - centre)
         self.left = self.target - self.J.T @ np.linalg.solve(self.L.T, np.linalg.solve(self.L, g))
         self.blocks = _block_of_each(estimator.tracks)

@@ -10,7 +10,6 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.kalman_filter import huber_weights
 
 LONGEST_STEP = 3.0
-LEAST_CURVATURE = 1e-9  # along directions that neither readings nor priors determine
 UNDAMPED = 1e-12  # damping of a step along directions that only the priors determine
 PROBE = 0.1  # share of such a step by which its second derivative is taken
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of such a step that are tried
@@ -51,17 +50,14 @@ def correction(J: NDArray, moved: NDArray, change: NDArray) -> NDArray:
     return moved[:, None, None] * (rest / float(moved @ moved))
 
 
-def regular(A: NDArray, damping: float = UNDAMPED) -> NDArray:
-    """A damped Gauss-Newton matrix (n, n), regular where nothing determines an unknown."""
-    return A + np.diag(damping * np.diag(A) + LEAST_CURVATURE)
-
-
 def damped_step(x, A, g, damping, low, high) -> NDArray:
     """A damped Gauss-Newton step within bounds: what a bound stops is left out."""
     use = np.ones(x.size, bool)
     trial = x
     for _ in range(3):
-        d = -np.linalg.solve(regular(A[np.ix_(use, use)], damping), g[use])
+        B = A[np.ix_(use, use)]
+        B = B + damping * np.diag(np.diag(B)) + 1e-9 * np.eye(len(B))
+        d = -np.linalg.solve(B, g[use])
         largest = np.max(np.abs(d) / (LONGEST_STEP + np.abs(x[use])), initial=0.0)
         if largest > 1.0:
             d /= largest
@@ -78,7 +74,7 @@ def curved(
     start: Start, v: NDArray, level: Sequence[NDArray], columns: Sequence[NDArray],
     probed: Sequence[NDArray], tempering: float,
 ) -> list[NDArray]:  # fmt: skip
-    """Ends (n,) of curved steps of several lengths; none where the probe failed.
+    """Ends (n,) of curved steps; none where the probe failed or the matrix is singular.
 
     Scales of torque and inertia that no reading states are determined by their priors alone. The
     cost has a narrow curved valley along them, in which damped straight steps hardly advance. The
@@ -104,5 +100,8 @@ def curved(
         return []
     free = v != 0.0
     a = np.zeros(v.size)
-    a[free] = -tempering * np.linalg.solve(regular(start.A[np.ix_(free, free)]), rhs[free])
+    try:
+        a[free] = -tempering * np.linalg.solve(start.A[np.ix_(free, free)], rhs[free])
+    except np.linalg.LinAlgError:  # nothing determines an unknown
+        return []
     return [start.x + s * v + 0.5 * s**2 * a for s in SHARES]

@@ -18,7 +18,6 @@ from rsea_core.identify.multistep.command_timing import (
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     DOUBTED_SHARE,
-    EQUAL_TIMING,
     LINEAR_GAIN,
     LONG_ROWS,
     LOST_IN_NOISE,
@@ -48,7 +47,7 @@ def parameters_with_timing(
 
     A timing that is given is not judged. Where parameters leave dependent innovations, the fit may
     have ended in a wrong place, from which another timing cannot be judged either: the horizons are
-    grown again with output errors, once with each that makes the readings more or less likely.
+    grown again with output errors, once with each.
     """
     first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
     if quick or not _in_doubt(first):
@@ -68,10 +67,8 @@ def parameters_with_timing(
     steps, ends = first[0].problem.steps, [first]
     for each in (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,):
         problem = MultistepProblem(case, timing=each, steps=steps)
-        if len(ends) > 1:
-            behind = _behind(ends[1], problem)
-            if behind > UNLIKELY_TIMING or abs(behind) < EQUAL_TIMING:
-                continue
+        if len(ends) > 1 and _behind(ends[1], problem) > UNLIKELY_TIMING:
+            continue
         ends.append(parameters(problem, h, say, output_errors=True))
         if each.smooth:  # from output errors the noise may end in a local maximum
             ends.append(parameters(problem, h, say))

@@ -69,7 +69,7 @@ def test_the_energy_of_a_rigid_train_balances_with_the_error():
     assert np.max(np.abs(energy.imbalance_J())) < 1e-9 * supplied
 
 
-def test_the_largest_waves_are_the_amplitudes_reported():
+def test_the_largest_harmonics_are_the_amplitudes_reported():
     wave_generator = GearTransmissionError(
         wheel_amplitude_rad=5.5e-4, worm_amplitude_rad=2e-7, worm_second_amplitude_rad=1.6e-4
     )

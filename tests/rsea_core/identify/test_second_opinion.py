@@ -69,9 +69,7 @@ def test_complete_laws_of_windows_replace_those_of_free_runs_that_leave_much(
     assert diagnose(case) is opinions[taken]
 
 
-def test_a_search_in_windows_that_fails_is_stated_beside_what_free_runs_found(
-    tmp_path, monkeypatch
-):
+def test_a_search_in_windows_that_fails_is_stated_with_what_free_runs_found(tmp_path, monkeypatch):
     def fails(*_, **__):
         raise np.linalg.LinAlgError("Singular matrix")
 
