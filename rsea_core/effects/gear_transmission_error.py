@@ -231,9 +231,9 @@ class GearTransmissionError(Term):
     worm_third_phase_rad: float = _phase("worm", 3)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Amplitudes of the largest waves of wheel and worm.
+        """Amplitudes of the largest harmonics of wheel and worm.
 
-        The generator of a strain wave gear makes two waves a turn and hardly any once.
+        The error of a strain wave gear repeats twice in a turn of its wave generator.
         """
         worm = (self.worm_amplitude_rad, self.worm_second_amplitude_rad,
                 self.worm_third_amplitude_rad)  # fmt: skip

@@ -194,8 +194,8 @@ def lower_beyond_chance(new: NDArray, old: NDArray) -> bool:
 
     The root mean square of the errors must be below `LESS_ERROR` of the others', and the mean
     difference of the windows, relative to the sum of both, must exceed `ERRORS_BEYOND` of its
-    standard errors. Differences that are not relative have too large a standard error where one
-    window leaves the recording: it holds nearly all of the squared error. With fewer than three
+    standard errors. (If one window contributes nearly all of the squared error, absolute
+    differences have a standard error as large as their mean.) With fewer than three
     windows the errors must be below `FEW_WINDOWS_ERROR`. True where only the new ones are finite.
     """
     if not np.all(np.isfinite(new)):

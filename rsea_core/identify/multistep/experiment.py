@@ -349,8 +349,8 @@ class MultistepProblem(Problem):
         """Damping at the output that balances the drive's torque at the usual speed.
 
         0 where the rig file states a damping above zero, or nothing drives the machine. A file
-        whose dampings are all zero is a model without damping: nobody measured it as in one that
-        leaves them out, and both are diagnosed alike.
+        whose dampings are all zero describes a model without damping, not a measurement: its
+        dampings have the same prior as omitted ones.
         """
         rig = self.case.rig
         stated = any(getattr(rig, key) for key in DAMPINGS)

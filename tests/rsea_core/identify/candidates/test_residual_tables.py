@@ -41,10 +41,15 @@ def faded(t, c):
     return torque / (1.0 + (torque / 2.0) ** 2 / 3.0) - torque
 
 
+def eccentric(t, c):
+    return 0.01 * np.sin(30.0 * c["load_angle_rad"])
+
+
 @pytest.mark.parametrize(
     ("column", "error", "law"),
     [
         ("torque_Nm", faded, VALUE),
+        ("load_angle_rad", eccentric, VALUE),
         ("motor_angle_rad", lost, SPEED),
     ],
 )
