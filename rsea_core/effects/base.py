@@ -179,6 +179,8 @@ class Term(ABC):
         The effect that this one reduces to if its further values are zero: it is no rival of it.
     in_spring_table : bool
         Whether it is nothing but a change of the spring's elastic law (`on_spring`).
+    adds_stiffness : bool
+        Whether it is a stiffness beside the spring's own, which small deflections do not tell apart.
     headline : str
         What it does to a machine, in one sentence.
     figure_units : mapping
@@ -197,6 +199,7 @@ class Term(ABC):
     replaces: ClassVar[str | None] = None
     generalises: ClassVar[str | None] = None
     in_spring_table: ClassVar[bool] = False
+    adds_stiffness: ClassVar[bool] = False
     headline: ClassVar[str] = ""
     figure_units: ClassVar[Mapping[str, str]] = {}
     curve: ClassVar = None

@@ -31,6 +31,7 @@ SLIP_YIELD = block("slip_yield", N_SLIPS)
 
 
 LOOP_AT_rad = 0.15  # where the contract compares loops
+CLOSING = 50  # secants, at most, until a loop closes
 LARGEST_STIFFENING = 20.0  # yields: amplitude up to which the loop of a stiffening law is reported
 
 
@@ -88,6 +89,7 @@ class Hysteresis(Term):
 
     effect: ClassVar[str] = "spring-hysteresis"
     port: ClassVar[Port] = Port.SPRING
+    adds_stiffness: ClassVar[bool] = True
     headline: ClassVar[str] = "Hysteresis: the spring's torque depends on its past deflection."
     figure_units: ClassVar[Mapping[str, str]] = {"loop_width_Nm": "Nm", "loop_energy_J": "J"}
 
@@ -326,11 +328,16 @@ class SpringBoucWen(Hysteresis):
                 found.append(z)
             return np.array(found)
 
-        tip = walk(0.0, 1.0, steps)[-1]
-        for _ in range(100):
-            before, tip = tip, -walk(tip, -1.0, 2 * steps)[-1]
-            if abs(tip - before) <= 1e-9 * y:
+        # a small loop closes slowly from cycle to cycle: the tip that stays is found by secants
+        before = walk(0.0, 1.0, steps)[-1]
+        tip = -walk(before, -1.0, 2 * steps)[-1]
+        moved = tip - before
+        for _ in range(CLOSING):
+            further = -walk(tip, -1.0, 2 * steps)[-1] - tip
+            if abs(further) <= 1e-12 * abs(tip) or further == moved:
                 break
+            tip, before = tip - further * (tip - before) / (further - moved), tip
+            moved = further
         back = walk(tip, -1.0, 2 * steps)
         forth = -back  # of the deflection with its sign changed
         there = forth[::-1]
@@ -359,9 +366,9 @@ class SpringBoucWen(Hysteresis):
 
     @classmethod
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
-        """A smooth loop."""
+        """A smooth loop, which has losses at deflections far below its yield too."""
         K, d = typical.stiffness, typical.deflection_rad
-        low, high = (2e-3 * d, 10.0 * d) if typical.relative else (1e-3, 1.0)
+        low, high = (2e-3 * d, 300.0 * d) if typical.relative else (1e-3, 1.0)
         begun, at_begin = _begun(typical)
         unknowns = (
             Unknown(
@@ -370,13 +377,15 @@ class SpringBoucWen(Hysteresis):
             Unknown(
                 name="yield_rad", unit="rad", low=low, high=high, scale=0.15, log=True, prior=1.0
             ),
-            Unknown(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True, prior=0.5),
-        )
+            Unknown(name="exponent", unit="-", low=1.0, high=5.0, scale=0.15, log=True, prior=0.5,
+                    closed=True),
+        )  # fmt: skip
         starts = ((0.1 * K, 0.3 * d, 1.5),)
         if typical.relative:
             shape = Unknown(name="shape", unit="-", low=-0.9, high=0.5, scale=0.2, closed=True)
             unknowns = (*unknowns, shape)
-            starts = ((0.1 * K, 0.3 * d, 1.5, 0.5), (0.1 * K, 0.5 * d, 1.0, -0.6))
+            starts = ((0.1 * K, 0.3 * d, 1.5, 0.5), (0.1 * K, 0.5 * d, 1.0, -0.6),
+                      (0.1 * K, 10.0 * d, 1.0, 0.2))  # fmt: skip
         return (
             Law(effect=cls.effect, law="bouc-wen", subsystem="spring", write=_write_bouc_wen,
                 richer=("four slips", "six slips"), unknowns=(*unknowns, *begun), kind=cls,

@@ -20,6 +20,7 @@ from rsea_core.identify.multistep.tracks import Track
 
 BATCH = 24  # trials predicted at once
 SMALLEST, LARGEST = 1e-3, 1e3  # size of a start that is screened again
+PROBE = 0.01  # the same of starts that showed no gain: at their size a resonance may move too far
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,15 +190,11 @@ def screen_again(
     A machine that turns freely does not respond in proportion to a torque that is ten times too
     large: it stops at a detent, and the column says nothing of the law. Sizes of laws without a
     sine and a cosine need not act in proportion, as a threshold does not: of these the better
-    screening counts.
+    screening counts. A spring that stiffens a lightly damped machine by ten percent puts it out of
+    phase, and even the sign of the law's size may be wrong.
     """
     known = {c.law.key: c.law for c in candidates}
-    begun = [
-        replace(
-            c.law, starts=(c.law.scaled(c.start, float(np.clip(abs(c.size), SMALLEST, LARGEST))),)
-        )
-        for c in candidates
-    ]
+    begun = [replace(c.law, starts=_starts_again(c)) for c in candidates]
     again = [replace(c, law=known[c.law.key]) for c in screen(estimator, fit, begun)]
     best: dict[str, Candidate] = {}
     pairs = {c.law.key for c in again if quarter_turn(c.law, c.start) is not None}
@@ -205,6 +202,13 @@ def screen_again(
     for c in sorted((*first, *again), key=lambda c: -c.gain):
         best.setdefault(c.law.key, c)
     return list(best.values())
+
+
+def _starts_again(c: Candidate) -> tuple[tuple[float, ...], ...]:
+    """The start at the size that a screening found; all starts, small ones, if it found no gain."""
+    if c.gain == 0.0:
+        return tuple(c.law.scaled(start, PROBE) for start in c.law.starts)
+    return (c.law.scaled(c.start, float(np.clip(abs(c.size), SMALLEST, LARGEST))),)
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:

@@ -14,6 +14,7 @@ SHORT = 4.0  # time scales of the motion: windows in which candidates are fitted
 APPLIED_CURRENT = 3.0  # deviations of the sensor: a larger error is that of another current
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
 UNLIKELY_TIMING = 500.0  # units behind: a timing with which no horizons are grown
+SAME_END = 3.0  # units: growths from different starts whose ends differ by less end alike
 TURNS = 0.1  # of the rows: a command that reverses in fewer is not smoothed
 FAST_SHARE = 0.2  # of what smoothing removes, that acts: of five commands in a row one is logged
 TIMING_DOUBT = 10.0  # units: a difference that does not tell a linear command from a held one

@@ -56,6 +56,9 @@ VELOCITIES = {
 LEAST_ROWS = 30  # of a recording
 LEAST_STEP_s = 1e-4  # of the engine, before it is made finer
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
+SPRING_STIFFNESS, LEAST_BACKBONE = "spring_stiffness_Nm_per_rad", 10.0
+"""A rig file's stiffness, and by what factor the elastic part beside a law that stiffens is less:
+a stiffness that was measured at a small deflection holds that law's stiffness too."""
 DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
 ANGLES = ("motor_angle_rad", "load_angle_rad")
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
@@ -362,8 +365,11 @@ class MultistepProblem(Problem):
     def bounds(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
         """Lowest and highest unknowns: what is stated stays near, no damping below zero."""
         low, high = super().bounds(hypothesis)
+        stiffens = any(getattr(law.kind, "adds_stiffness", False) for law in hypothesis.laws)
         for j, n in enumerate(self.nominals):
             low[j], high[j] = (0.0, FREE_BOUND) if _free(n) else (-self.reach, self.reach)
+            if stiffens and n.key == SPRING_STIFFNESS:
+                low[j] = min(low[j], -np.log(LEAST_BACKBONE) / n.tolerance)
         return low, high
 
     def within(self, tolerances: float) -> "MultistepProblem":

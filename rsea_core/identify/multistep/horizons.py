@@ -132,8 +132,9 @@ Growth = tuple[Estimator, Estimate, float | None]
 
 
 def parameters(
-    problem: MultistepProblem, h: Hypothesis, say, *, output_errors: bool = False
-) -> Growth:
+    problem: MultistepProblem, h: Hypothesis, say, *, output_errors: bool = False,
+    delay: float | None = None,
+) -> Growth:  # fmt: skip
     """Parameters and nuisances over growing horizons, as far as the machine is predictable.
 
     Parameters
@@ -141,17 +142,28 @@ def parameters(
     output_errors : bool
         Fit each horizon from whole windows too: unknown torques that are once estimated large
         explain any motion, and no value is pulled out of its wrong place any more.
+    delay : float or None
+        Unknown of the command's delay that another growth found, to begin from.
     """
     x = problem.start(h)
-    growth, late = _grown(problem, h, x, say, output_errors)
+    if delay is not None:
+        x[problem.names(h).index(DELAY)] = delay
+    growth, late = _grown(problem, h, x, say, output_errors, delay is not None)
     if not late:
         return growth
     say("grown again with the delay that the longest windows show")
     at = problem.names(h).index(DELAY)
     x[at] = growth[1].x[at]
-    again, _ = _grown(problem, h, x, say, output_errors)
+    again, _ = _grown(problem, h, x, say, output_errors, True)
     lost = relative_error(growth[0], h, growth[1].x) > LOST
     return again if lost else best_of(growth, again)
+
+
+def delay_of(growth: Growth) -> float | None:
+    """Unknown of the command's delay; None where none is free."""
+    estimator, fit, _ = growth
+    names = estimator.problem.names(fit.hypothesis)
+    return float(fit.x[names.index(DELAY)]) if DELAY in names else None
 
 
 def best_of(*ends: Growth) -> Growth:
@@ -166,8 +178,9 @@ def _length(horizon: float | None) -> float:
 
 
 def _grown(
-    problem: MultistepProblem, h: Hypothesis, x: NDArray, say, output_errors: bool
-) -> tuple[Growth, bool]:
+    problem: MultistepProblem, h: Hypothesis, x: NDArray, say, output_errors: bool,
+    knows_delay: bool,
+) -> tuple[Growth, bool]:  # fmt: skip
     """Parameters from a start, and whether the longest windows alone showed the command's delay."""
     estimator = initial_estimator(problem)
     smooth(estimator, h, x)
@@ -176,10 +189,11 @@ def _grown(
         if horizon is not None and not long_enough(estimator, horizon):
             continue
         trial = estimator.having(with_windows(estimator, horizon))
-        fit = trial.fit(h, x, iterations=5) if known else with_best_delay(trial, h, x)
+        late_is_known = known or knows_delay
+        fit = trial.fit(h, x, iterations=5) if late_is_known else with_best_delay(trial, h, x)
         ends = [_in_own_noise(trial, fit)]
         if output_errors:
-            ends.append(_from_output_error(trial, h, x, known))
+            ends.append(_from_output_error(trial, h, x, late_is_known))
         trial, fit = with_fine_steps(*likelier(*ends), say)
         error = relative_error(trial, h, fit.x)
         say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")

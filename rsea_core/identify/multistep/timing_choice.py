@@ -6,6 +6,8 @@ in `FINER` parts of each row, which multiplies the steps: where a cycle of the m
 of rows (EMPS: 5900), the mean over each row is accurate enough.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from rsea_core.identify.fitting.problem import Hypothesis
@@ -21,6 +23,7 @@ from rsea_core.identify.multistep.criteria import (
     LINEAR_GAIN,
     LONG_ROWS,
     LOST_IN_NOISE,
+    SAME_END,
     UNLIKELY_TIMING,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -28,6 +31,7 @@ from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import (
     Growth,
     best_of,
+    delay_of,
     in_steps,
     parameters,
     relative_error,
@@ -64,15 +68,45 @@ def parameters_with_timing(
         if quick or not _in_doubt(first):
             return first
     say("the fit may be in a wrong place: grown again from output errors")
-    steps, ends = first[0].problem.steps, [first]
-    for each in (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,):
+    return best_of(first, *_grown_from_output_errors(first, case, say, timing))
+
+
+def _grown_from_output_errors(
+    first: Growth, case: Case, say, timing: CommandTiming | None
+) -> list[Growth]:
+    """Growths from output errors with one timing, or with each that is likely enough.
+
+    Where the first of them ends where the fit in doubt did, the start does not matter, and another
+    timing is tried only if the same values make it likelier. A smoothed command differs little from
+    a linear one and is judged beside it in the same way.
+    """
+    h, steps, used = first[1].hypothesis, first[0].problem.steps, first[0].problem.timing
+    delay = delay_of(first)
+    ends: dict[CommandTiming, Growth] = {}
+    more: list[Growth] = []
+    least = UNLIKELY_TIMING
+    every = (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,)
+    for each in sorted(every, key=lambda t: t != used):
         problem = MultistepProblem(case, timing=each, steps=steps)
-        if len(ends) > 1 and _behind(ends[1], problem) > UNLIKELY_TIMING:
-            continue
-        ends.append(parameters(problem, h, say, output_errors=True))
+        if ends:
+            linear = replace(each, fast_share=1.0)
+            nearest = ends[linear] if each.smooth and linear in ends else ends[used]
+            most = -LINEAR_GAIN if each.smooth and linear in ends else least
+            if _behind(nearest, problem) > most:
+                continue
+        ends[each] = parameters(problem, h, say, output_errors=True, delay=delay)
+        if each == used and _ends_alike(first, ends[used]):
+            least = -LINEAR_GAIN
         if each.smooth:  # from output errors the noise may end in a local maximum
-            ends.append(parameters(problem, h, say))
-    return best_of(*ends)
+            more.append(parameters(problem, h, say, delay=delay))
+    return [*ends.values(), *more]
+
+
+def _ends_alike(a: Growth, b: Growth) -> bool:
+    """Whether two growths are predictable for as long and as likely."""
+    share = min(a[0].tempering, b[0].tempering)
+    costs = [share * fit.likelihood + fit.prior_cost for _, fit, _ in (a, b)]
+    return a[2] == b[2] and abs(costs[0] - costs[1]) < SAME_END
 
 
 def _behind(growth: Growth, problem: MultistepProblem) -> float:

@@ -114,9 +114,9 @@ def test_smoothed_commands_are_also_fitted_without_output_errors_where_a_fit_is_
 ):
     made, plain = [], timing_choice.parameters
 
-    def recorded(problem, h, say, *, output_errors=False):
+    def recorded(problem, h, say, *, output_errors=False, delay=None):
         made.append((problem.timing.smooth, output_errors))
-        return plain(problem, h, say, output_errors=output_errors)
+        return plain(problem, h, say, output_errors=output_errors, delay=delay)
 
     monkeypatch.setattr(timing_choice, "parameters", recorded)
     case = axis_case(tmp_path, fast_loop_recording(seed=1), rig=fast_loop_rig())

@@ -48,21 +48,33 @@ def test_rows_whose_innovations_change_keep_their_parts(fitted, monkeypatch):
     assert with_mean_commands(estimator, base) is estimator
 
 
-@pytest.mark.parametrize(("unlikely", "timings"), [(500.0, [False]), (np.inf, [False, True])])
-def test_no_horizons_are_grown_with_a_timing_that_is_far_less_likely(
-    tmp_path, monkeypatch, unlikely, timings
+@pytest.mark.parametrize(
+    ("limits", "timings"),
+    [
+        ({"SAME_END": 0.0}, [False]),
+        ({"UNLIKELY_TIMING": np.inf}, [False]),
+        ({"SAME_END": 0.0, "UNLIKELY_TIMING": np.inf}, [False, True]),
+    ],
+    ids=["far less likely", "the start does not matter", "neither"],
+)
+def test_horizons_are_grown_with_another_timing_only_if_it_can_be_right(
+    tmp_path, monkeypatch, limits, timings
 ):
-    """The commands are held: with linear ones the readings are 7800 units less likely."""
+    """The commands are held: with linear ones the readings are 7800 units less likely.
+
+    Both growths with held ones end at the same values, so that no start is in doubt.
+    """
     grown, plain = [], timing_choice.parameters
 
-    def recorded(problem, h, say, *, output_errors=False):
+    def recorded(problem, h, say, *, output_errors=False, delay=None):
         if output_errors:
             grown.append(problem.timing.linear)
-        return plain(problem, h, say, output_errors=output_errors)
+        return plain(problem, h, say, output_errors=output_errors, delay=delay)
 
     monkeypatch.setattr(timing_choice, "parameters", recorded)
     monkeypatch.setattr(timing_choice, "DOUBTED_ERROR", 0.0)  # any fit is in doubt
-    monkeypatch.setattr(timing_choice, "UNLIKELY_TIMING", unlikely)
+    for name, limit in limits.items():
+        monkeypatch.setattr(timing_choice, name, limit)
     case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
     parameters_with_timing(case, Hypothesis(laws=nuisances(case)), lambda text: None)
     assert grown == timings
