@@ -51,7 +51,7 @@ def test_rows_whose_innovations_change_keep_their_parts(fitted, monkeypatch):
 @pytest.mark.parametrize(
     ("limits", "timings"),
     [
-        ({"SAME_END": 0.0}, [False]),
+        ({"SAME_END": 0.0, "UNLIKELY_TIMING": 100.0}, [False]),
         ({"UNLIKELY_TIMING": np.inf}, [False]),
         ({"SAME_END": 0.0, "UNLIKELY_TIMING": np.inf}, [False, True]),
     ],
@@ -60,7 +60,7 @@ def test_rows_whose_innovations_change_keep_their_parts(fitted, monkeypatch):
 def test_horizons_are_grown_with_another_timing_only_if_it_can_be_right(
     tmp_path, monkeypatch, limits, timings
 ):
-    """The commands are held: with linear ones the readings are 7800 units less likely.
+    """The commands are held: with linear ones the readings are 180 to 7800 units less likely.
 
     Both growths with held ones end at the same values, so that no start is in doubt.
     """
