@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.load_unbalance import LoadUnbalance
-from rsea_core.identify.candidates.catalogue import of_one_body, rivals_of
+from rsea_core.identify.candidates.catalogue import indistinguishable, of_one_body, rivals_of
 from rsea_core.identify.candidates.rig_parameters import place_of
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.criteria import UNBALANCE_TOLERANCES, UNBALANCE_OFFSET_rad
@@ -185,6 +185,7 @@ class WindowVerdict(Conclusion):
                 confidence = min(confidence, UNCLAIMED)
             scale = RIVAL_SCALE + RIVAL_SHARE * step.gain
             alike = [w.effect for w, g in rivals_of(step.law, step.rivals) if step.gain - g < scale]
+            alike += indistinguishable(step.law, self.case.rig)
             found.append(
                 {
                     "name": step.law.effect,

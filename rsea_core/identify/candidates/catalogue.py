@@ -53,6 +53,12 @@ def of_one_body(rig: Rig) -> set[str]:
     return set() if rig.has("spring") else {GEAR, LoadFriction.effect}
 
 
+def indistinguishable(law: Law, rig: Rig) -> list[str]:
+    """Other effects that are the same law on this machine: friction on either side of one body."""
+    one = of_one_body(rig) if rig.has("gear") and rig.has("load") else set()
+    return sorted(one - {law.effect}) if law.effect in one else []
+
+
 def rivals_of(law: Law, others: Iterable[tuple[Law, float]]) -> list[tuple[Law, float]]:
     """Laws and their gains, without laws of an effect that generalises the law's own."""
     return [(w, gain) for w, gain in others if w.kind is None or w.kind.generalises != law.effect]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rsea_core.effects.registry import DriveThermal, LoadDrag
-from rsea_core.identify.candidates.catalogue import catalogue, of_one_body
+from rsea_core.identify.candidates.catalogue import catalogue, indistinguishable, of_one_body
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
@@ -30,6 +30,26 @@ def test_a_bare_shaft_can_drive_a_propeller_and_has_one_dry_friction(tmp_path):
 def test_an_axis_with_a_load_has_both_frictions_as_one_law_of_one_body(tmp_path):
     assert {"gear-friction", "load-friction"} <= effects(tmp_path, axis_rig())
     assert of_one_body(axis_rig()) == {"gear-friction", "load-friction"}
+
+
+@pytest.mark.parametrize(
+    ("effect", "parts", "same"),
+    [
+        ("load-friction", ("drive", "gear", "load"), ["gear-friction"]),
+        ("gear-friction", ("drive", "gear", "load"), ["load-friction"]),
+        ("load-drag", ("drive", "gear", "load"), []),
+        ("gear-friction", ("drive", "gear"), []),
+    ],
+)
+def test_friction_of_gear_and_load_is_stated_as_one_class_where_both_are_one_body(
+    tmp_path, effect, parts, same
+):
+    rig = replace(axis_rig(), parts=parts)
+    if "load" not in parts:
+        rig = replace(rig, load_inertia_kgm2=None, load_viscous_Nms_per_rad=None)
+    case = axis_case(tmp_path, axis_recording(seed=3), rig=rig)
+    law = next(w for w in catalogue(case, relative=True).values() if w.effect == effect)
+    assert indistinguishable(law, rig) == same
 
 
 def test_nothing_happens_once_a_turn_of_a_load_that_moves_along_a_line(tmp_path):

@@ -57,6 +57,7 @@ def test_dry_friction_of_an_axis_is_named_in_any_unit(tmp_path, units):
     found = diagnose_windows(axis(tmp_path, GearFriction(coulomb_Nm=level), units=units))
     assert found.document["verdict"] == "missing-physics"
     assert claims(found)[0] in ("gear-friction", "load-friction")
+    assert {"gear-friction", "load-friction"} <= set(found.document["effects"][0]["class"])
     value = found.document["effects"][0]["parameters"]["coulomb_Nm"]["value"]
     assert value == pytest.approx(level, rel=0.1)
 
@@ -98,6 +99,7 @@ def test_one_recording_of_a_bare_pendulum_shows_its_dry_friction(tmp_path):
     found = diagnose_windows(pendulum_case(tmp_path, LoadFriction(coulomb_Nm=3e-3), seed=1))
     first = found.document["effects"][0]
     assert first["name"] == "load-friction"
+    assert first["class"] == ["load-friction"]  # it has no gear
     assert first["confidence"] >= 0.5
     assert first["parameters"]["coulomb_Nm"]["value"] == pytest.approx(3e-3, rel=0.15)
 
