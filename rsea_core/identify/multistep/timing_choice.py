@@ -85,8 +85,8 @@ def _grown_from_output_errors(
     ends: dict[CommandTiming, Growth] = {}
     more: list[Growth] = []
     least = UNLIKELY_TIMING
-    every = (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else (timing,)
-    for each in sorted(every, key=lambda t: t != used):
+    others = (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else ()
+    for each in (used, *(t for t in others if t != used)):  # the one used may be none of the others
         problem = MultistepProblem(case, timing=each, steps=steps)
         if ends:
             linear = replace(each, fast_share=1.0)

@@ -5,7 +5,7 @@ import pytest
 
 import rsea_core.identify.multistep.timing_choice as timing_choice
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.command_timing import CommandTiming
+from rsea_core.identify.multistep.command_timing import CommandTiming, RowTimes
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.timing_choice import parameters_with_timing, with_mean_commands
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
@@ -78,3 +78,25 @@ def test_horizons_are_grown_with_another_timing_only_if_it_can_be_right(
     case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
     parameters_with_timing(case, Hypothesis(laws=nuisances(case)), lambda text: None)
     assert grown == timings
+
+
+def test_a_fit_in_doubt_is_grown_again_with_the_timing_that_it_has(tmp_path, monkeypatch):
+    """Linear commands at even times are two changes away from what the file contract says."""
+    used = CommandTiming(linear=True, rows=RowTimes.READINGS)
+    case = axis_case(tmp_path, axis_recording(seed=1, uneven=0.02), rig=axis_rig())
+    assert used not in timing_choice.timings(case, timing_choice.AS_LOGGED)
+    h, grown, plain = Hypothesis(laws=nuisances(case)), [], timing_choice.parameters
+
+    def recorded(problem, h, say, *, output_errors=False, delay=None):
+        if output_errors:
+            grown.append(problem.timing)
+        return plain(problem, h, say, output_errors=output_errors, delay=delay)
+
+    def changed(estimator, fit, case, say):
+        monkeypatch.setattr(timing_choice, "DOUBTED_ERROR", 0.0)  # from here on a fit is in doubt
+        return plain(timing_choice.MultistepProblem(case, timing=used), h, say)[:2]
+
+    monkeypatch.setattr(timing_choice, "parameters", recorded)
+    monkeypatch.setattr(timing_choice, "with_better_timing", changed)
+    parameters_with_timing(case, h, lambda text: None)
+    assert grown[0] == used
