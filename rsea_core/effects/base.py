@@ -180,7 +180,7 @@ class Term(ABC):
     in_spring_table : bool
         Whether it is nothing but a change of the spring's elastic law (`on_spring`).
     adds_stiffness : bool
-        Whether it is a stiffness parallel to the spring, which small deflections do not tell apart.
+        Whether it acts as a further stiffness parallel to the spring at small deflections.
     headline : str
         What it does to a machine, in one sentence.
     figure_units : mapping

@@ -31,7 +31,7 @@ SLIP_YIELD = block("slip_yield", N_SLIPS)
 
 
 LOOP_AT_rad = 0.15  # where the contract compares loops
-CLOSING = 50  # secants, at most, until a loop closes
+CLOSING = 50  # iterations of the secant method for the steady loop, at most
 LARGEST_STIFFENING = 20.0  # yields: amplitude up to which the loop of a stiffening law is reported
 
 
@@ -328,7 +328,7 @@ class SpringBoucWen(Hysteresis):
                 found.append(z)
             return np.array(found)
 
-        # a small loop closes slowly from cycle to cycle: the tip that stays is found by secants
+        # a small loop needs many cycles to become steady: its tip follows by the secant method
         before = walk(0.0, 1.0, steps)[-1]
         tip = -walk(before, -1.0, 2 * steps)[-1]
         moved = tip - before
@@ -366,7 +366,7 @@ class SpringBoucWen(Hysteresis):
 
     @classmethod
     def candidates(cls, typical: TypicalMagnitudes) -> Sequence[Law]:
-        """A smooth loop, which has losses at deflections far below its yield too."""
+        """A smooth loop, which dissipates energy at deflections far below its yield too."""
         K, d = typical.stiffness, typical.deflection_rad
         low, high = (2e-3 * d, 300.0 * d) if typical.relative else (1e-3, 1.0)
         begun, at_begin = _begun(typical)

@@ -20,7 +20,7 @@ from rsea_core.identify.multistep.tracks import Track
 
 BATCH = 24  # trials predicted at once
 SMALLEST, LARGEST = 1e-3, 1e3  # size of a start that is screened again
-PROBE = 0.01  # the same of starts that showed no gain: at their size a resonance may move too far
+FAR_BELOW, REDUCED = 0.1, 0.01  # size below which all starts are; their size if none gained
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,8 +190,9 @@ def screen_again(
     A machine that turns freely does not respond in proportion to a torque that is ten times too
     large: it stops at a detent, and the column says nothing of the law. Sizes of laws without a
     sine and a cosine need not act in proportion, as a threshold does not: of these the better
-    screening counts. A spring that stiffens a lightly damped machine by ten percent puts it out of
-    phase, and even the sign of the law's size may be wrong.
+    screening counts. Of laws that showed no gain, or whose size is far below their starts', all
+    starts are screened again: a law that adds a tenth of the stiffness shifts the resonance of a
+    lightly damped machine so far that the linear size, even its sign, is wrong.
     """
     known = {c.law.key: c.law for c in candidates}
     begun = [replace(c.law, starts=_starts_again(c)) for c in candidates]
@@ -205,10 +206,12 @@ def screen_again(
 
 
 def _starts_again(c: Candidate) -> tuple[tuple[float, ...], ...]:
-    """The start at the size that a screening found; all starts, small ones, if it found no gain."""
-    if c.gain == 0.0:
-        return tuple(c.law.scaled(start, PROBE) for start in c.law.starts)
-    return (c.law.scaled(c.start, float(np.clip(abs(c.size), SMALLEST, LARGEST))),)
+    """The start at the size that a screening found; all starts, if that is far below theirs."""
+    size = float(np.clip(abs(c.size), SMALLEST, LARGEST))
+    if c.gain > 0.0 and size >= FAR_BELOW:
+        return (c.law.scaled(c.start, size),)
+    size = size if c.gain > 0.0 else REDUCED
+    return tuple(c.law.scaled(start, size) for start in c.law.starts)
 
 
 def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]:

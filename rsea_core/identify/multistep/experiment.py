@@ -56,9 +56,9 @@ VELOCITIES = {
 LEAST_ROWS = 30  # of a recording
 LEAST_STEP_s = 1e-4  # of the engine, before it is made finer
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
-SPRING_STIFFNESS, LEAST_BACKBONE = "spring_stiffness_Nm_per_rad", 10.0
-"""A rig file's stiffness, and by what factor the elastic part beside a law that stiffens is less:
-a stiffness that was measured at a small deflection holds that law's stiffness too."""
+SPRING_STIFFNESS, LARGEST_RATIO = "spring_stiffness_Nm_per_rad", 10.0
+"""Key of the stated stiffness, and the largest ratio of it to the stiffness of the elastic part
+where a law adds stiffness: one measured at small deflections is the sum of both."""
 DAMPED = 0.3  # damping that takes this share of the motion in its own time, as a scale
 ANGLES = ("motor_angle_rad", "load_angle_rad")
 STATE_CHANNELS = ("current_A", "motor_angle_rad", "motor_velocity_rad_per_s", "load_angle_rad",
@@ -363,13 +363,16 @@ class MultistepProblem(Problem):
         return usual.motor_torque_Nm * (rig.gear_ratio or 1.0) / usual.speed_rad_per_s
 
     def bounds(self, hypothesis: Hypothesis) -> tuple[NDArray, NDArray]:
-        """Lowest and highest unknowns: what is stated stays near, no damping below zero."""
+        """Lowest and highest unknowns: what is stated stays near, no damping below zero.
+
+        A stated stiffness may include that of a law which adds stiffness (`LARGEST_RATIO`).
+        """
         low, high = super().bounds(hypothesis)
         stiffens = any(getattr(law.kind, "adds_stiffness", False) for law in hypothesis.laws)
         for j, n in enumerate(self.nominals):
             low[j], high[j] = (0.0, FREE_BOUND) if _free(n) else (-self.reach, self.reach)
             if stiffens and n.key == SPRING_STIFFNESS:
-                low[j] = min(low[j], -np.log(LEAST_BACKBONE) / n.tolerance)
+                low[j] = min(low[j], -np.log(LARGEST_RATIO) / n.tolerance)
         return low, high
 
     def within(self, tolerances: float) -> "MultistepProblem":

@@ -143,7 +143,7 @@ def parameters(
         Fit each horizon from whole windows too: unknown torques that are once estimated large
         explain any motion, and no value is pulled out of its wrong place any more.
     delay : float or None
-        Unknown of the command's delay that another growth found, to begin from.
+        The unknown of the command's delay as another growth found it: the start, without a search.
     """
     x = problem.start(h)
     if delay is not None:
@@ -179,7 +179,7 @@ def _length(horizon: float | None) -> float:
 
 def _grown(
     problem: MultistepProblem, h: Hypothesis, x: NDArray, say, output_errors: bool,
-    knows_delay: bool,
+    delay_is_known: bool,
 ) -> tuple[Growth, bool]:  # fmt: skip
     """Parameters from a start, and whether the longest windows alone showed the command's delay."""
     estimator = initial_estimator(problem)
@@ -189,11 +189,11 @@ def _grown(
         if horizon is not None and not long_enough(estimator, horizon):
             continue
         trial = estimator.having(with_windows(estimator, horizon))
-        late_is_known = known or knows_delay
-        fit = trial.fit(h, x, iterations=5) if late_is_known else with_best_delay(trial, h, x)
+        near = known or delay_is_known
+        fit = trial.fit(h, x, iterations=5) if near else with_best_delay(trial, h, x)
         ends = [_in_own_noise(trial, fit)]
         if output_errors:
-            ends.append(_from_output_error(trial, h, x, late_is_known))
+            ends.append(_from_output_error(trial, h, x, near))
         trial, fit = with_fine_steps(*likelier(*ends), say)
         error = relative_error(trial, h, fit.x)
         say(f"parameters over {horizon or 'all'} T: error {error:.3g} of the spread")

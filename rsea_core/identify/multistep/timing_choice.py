@@ -51,7 +51,7 @@ def parameters_with_timing(
 
     A timing that is given is not judged. Where parameters leave dependent innovations, the fit may
     have ended in a wrong place, from which another timing cannot be judged either: the horizons are
-    grown again with output errors, once with each.
+    grown again from output errors (`_grown_from_output_errors`).
     """
     first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
     if quick or not _in_doubt(first):
@@ -76,9 +76,9 @@ def _grown_from_output_errors(
 ) -> list[Growth]:
     """Growths from output errors with one timing, or with each that is likely enough.
 
-    Where the first of them ends where the fit in doubt did, the start does not matter, and another
-    timing is tried only if the same values make it likelier. A smoothed command differs little from
-    a linear one and is judged beside it in the same way.
+    If the first of them ends where the fit in doubt did, the start does not matter, and another
+    timing must be likelier when it is refitted from that end. Smoothed commands differ little from
+    linear ones: they must be likelier when refitted from the end of the growth with these.
     """
     h, steps, used = first[1].hypothesis, first[0].problem.steps, first[0].problem.timing
     delay = delay_of(first)
@@ -86,13 +86,12 @@ def _grown_from_output_errors(
     more: list[Growth] = []
     least = UNLIKELY_TIMING
     others = (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else ()
-    for each in (used, *(t for t in others if t != used)):  # the one used may be none of the others
+    for each in (used, *(t for t in others if t != used)):
         problem = MultistepProblem(case, timing=each, steps=steps)
         if ends:
-            linear = replace(each, fast_share=1.0)
-            nearest = ends[linear] if each.smooth and linear in ends else ends[used]
-            most = -LINEAR_GAIN if each.smooth and linear in ends else least
-            if _behind(nearest, problem) > most:
+            unsmoothed = ends.get(replace(each, fast_share=1.0)) if each.smooth else None
+            most = least if unsmoothed is None else -LINEAR_GAIN
+            if _behind(unsmoothed or ends[used], problem) > most:
                 continue
         ends[each] = parameters(problem, h, say, output_errors=True, delay=delay)
         if each == used and _ends_alike(first, ends[used]):
@@ -103,7 +102,7 @@ def _grown_from_output_errors(
 
 
 def _ends_alike(a: Growth, b: Growth) -> bool:
-    """Whether two growths are predictable for as long and as likely."""
+    """Whether two growths reach the same horizon with almost the same cost."""
     share = min(a[0].tempering, b[0].tempering)
     costs = [share * fit.likelihood + fit.prior_cost for _, fit, _ in (a, b)]
     return a[2] == b[2] and abs(costs[0] - costs[1]) < SAME_END

@@ -1,4 +1,4 @@
-"""A Bouc-Wen loop has losses far below its yield, and a fit finds it there (motion on a shaker)."""
+"""A Bouc-Wen spring dissipates energy far below its yield; a fit finds it (mass on a shaker)."""
 
 from dataclasses import replace
 
@@ -12,6 +12,7 @@ from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import at_bound, fitted
 from rsea_core.identify.law_search.screening import screen, screen_again
+from rsea_core.identify.multistep.criteria import LEAST_GAIN
 from rsea_core.identify.multistep.horizons import with_fine_steps
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.timing_choice import parameters_with_timing
@@ -57,17 +58,27 @@ def shaken(term, *, seed: int) -> Recording:
     return Recording(file="shaken.csv", load=locked, columns=columns, sample_time_s=ROW_s)
 
 
-def test_a_loop_far_below_its_yield_is_fitted_within_the_law_s_bounds(tmp_path):
-    case = axis_case(tmp_path, shaken(LOOP, seed=3), rig=RIG)
+@pytest.mark.parametrize(
+    ("yield_rad", "stated", "tolerance"),
+    [(0.003, 1e5, 0.1), (0.0012, 1e5, 0.1), (0.0012, 1.4e5, 0.05)],
+    ids=["25 deflections", "10 deflections", "small-deflection stiffness stated"],
+)
+def test_a_loop_far_below_its_yield_is_fitted(tmp_path, yield_rad, stated, tolerance):
+    """The small-deflection stiffness, 1e5 + 4e4 Nm/rad, is 7 tolerances above the elastic one."""
+    spring = replace(LOOP, yield_rad=yield_rad)
+    rig = replace(RIG, spring_stiffness_Nm_per_rad=stated,
+                  tolerances=(("spring_stiffness_Nm_per_rad", tolerance),))  # fmt: skip
+    case = axis_case(tmp_path, shaken(spring, seed=3), rig=rig)
     h = Hypothesis(laws=nuisances(case))
     estimator, base, _ = parameters_with_timing(case, h, lambda text: None)
     estimator, base = with_fine_steps(estimator, base, lambda text: None)
     law = next(w for w in catalogue(case, relative=True).values() if w.law == LOOP.law)
-    assert LOOP.yield_rad > 10.0 * own_magnitudes(case).deflection_rad
+    assert yield_rad > 10.0 * own_magnitudes(case).deflection_rad
     candidate = screen_again(estimator, base, screen(estimator, base, [law], wrong_signs=True))[0]
+    assert candidate.gain > LEAST_GAIN
     fit = fitted(estimator, base, candidate, iterations=20)
     found = estimator.problem.values(fit.hypothesis, fit.x)[1][-1]
     assert not at_bound(estimator.problem, fit, law)
     largest = np.max(np.abs(case.identification[0]["motor_angle_rad"]))
-    of_fit, of_spring = (term.loop(largest)[1] for term in (SpringBoucWen(**found), LOOP))
+    of_fit, of_spring = (term.loop(largest)[1] for term in (SpringBoucWen(**found), spring))
     assert of_fit == pytest.approx(of_spring, rel=0.1)
