@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.found import Found, from_growth
 from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
 from rsea_core.identify.law_search.hold_out import with_pause_shown, with_shared_recordings
 from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
@@ -24,8 +25,22 @@ from rsea_core.identify.multistep.criteria import (
     TIMING_SHARE,
 )
 from rsea_core.identify.multistep.horizons import likelier, relative_error
-from rsea_core.identify.multistep.timing_choice import with_better_timing
-from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
+from rsea_core.identify.multistep.log_nuisances import nuisances
+from rsea_core.identify.multistep.timing_choice import (
+    ends_alike,
+    first_growth,
+    grown_again,
+    in_better_timing,
+    in_doubt,
+    with_better_timing,
+)
+from rsea_core.identify.whole_runs.complete import (
+    concluded,
+    confirmed_by_whole_runs,
+    laws_added,
+    of_first_growth,
+    with_whole_runs,
+)
 from rsea_core.identify.whole_runs.sensor_noise import refitted_from_rig
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
 from rsea_core.recordings.case import Case
@@ -45,16 +60,17 @@ def investigate(
     case, shared = with_shared_recordings(recorded)
     for file, why in shared.items():
         say(f"{file}: two thirds are fitted: {why}")
-    found = begun(case, None, say, quick=quick)
     nearly = None
-    if not quick:
-        found, nearly = with_whole_runs(found, say)
+    if quick:
+        found = begun(case, None, say, quick=True)
+    else:
+        found, nearly = _whole_recordings(case, say)
         missed = unpredicted_recordings(found) if found.sound and not found.complete else []
         other, more = with_shared_recordings(recorded, missed)
         if more.keys() - shared.keys():  # of those long enough to be shared
             case, shared = other, more
             say(f"not predicted, searched again with two thirds of them: {', '.join(missed)}")
-            found, nearly = with_whole_runs(begun(case, None, say), say)
+            found, nearly = _whole_recordings(case, say)
         if nearly is not None and nearly.explained > NEEDS_NO_WINDOWS:
             found = nearly
     if not (found.complete or found.sound):
@@ -69,6 +85,28 @@ def investigate(
     _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
     found.best, found.pause_shown = replace(best, x=x), x is not best.x
     return found
+
+
+def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
+    """What whole recordings show (`with_whole_runs`), of one growth of windows or of several.
+
+    A missing law leaves the first growth in doubt. Where laws of whole recordings explain what it
+    leaves, no other growth is needed.
+    """
+    h = Hypothesis(laws=nuisances(case))
+    first = first_growth(case, h, say)
+    if not in_doubt(first):
+        return with_whole_runs(from_growth(first, say), say)
+    better = in_better_timing(first, case, say)
+    found, search = laws_added(from_growth(better, say), say)
+    end = of_first_growth(found, search, say)
+    if end is not None:
+        return end, None
+    best = grown_again(first, case, say)
+    same = best[0].problem.timing == better[0].problem.timing and ends_alike(best, better)
+    if same and search.left() > search.enough:
+        return concluded(found, search, say)
+    return with_whole_runs(from_growth(best, say), say)
 
 
 def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:

@@ -52,7 +52,7 @@ from rsea_core.identify.multistep.tracks import prepared
 
 def fitted(
     estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None, *,
-    factors: Sequence[float] = (1.0, 0.5), iterations: int = 8,
+    factors: Sequence[float] = (1.0, 0.5), iterations: int = 8, least: float = np.inf,
 ) -> Estimate:  # fmt: skip
     """A candidate fitted from its best size, beside what is fitted already.
 
@@ -62,6 +62,8 @@ def fitted(
         In short windows, where a law that is far off still predicts in phase: a further start.
     factors : sequence of float
         Of the size that the screening saw: starts, beside its own.
+    least : float
+        Cost that the fit must reach to be of use (`Estimator.fit`).
     """
     problem = estimator.problem
     h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
@@ -77,7 +79,8 @@ def fitted(
         begun = short.fit(h, trials[int(np.argmin(own_costs))][1], iterations=5)
         trials.append((h, begun.x))
     costs = estimator.costs(trials)
-    return estimator.fit(h, trials[int(np.argmin(costs))][1], iterations=iterations)
+    begin = trials[int(np.argmin(costs))][1]
+    return estimator.fit(h, begin, iterations=iterations, least=least)
 
 
 def settled(

@@ -6,11 +6,20 @@ import numpy as np
 
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.variant import Law
+from rsea_core.identify.law_search.candidate_fits import settled
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.law_search.shape_search import Shape
-from rsea_core.identify.multistep.criteria import LEAST_EXCESS, LOST, SOUND, UNEVEN_GAIN
+from rsea_core.identify.multistep.criteria import (
+    LEAST_EXCESS,
+    LOST,
+    SEARCH_STEPS,
+    SOUND,
+    UNEVEN_GAIN,
+)
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.multistep.horizons import Growth, with_fine_steps
+from rsea_core.identify.multistep.timing_choice import with_mean_commands
 
 Entry = tuple[Candidate, Estimator, Estimate]
 """A candidate fitted to its end, in its own noise."""
@@ -157,3 +166,14 @@ class Found:
         if not self.steps:
             self.base_estimator, self.base = estimator, fit
         self.estimator, self.best = estimator, fit
+
+
+def from_growth(growth: Growth, say, *, quick: bool = False) -> Found:
+    """Parameters alone as a growth of windows ended, in steps for the search of laws."""
+    estimator, base, horizon = growth
+    estimator, base = with_fine_steps(estimator, base, say, per_cycle=SEARCH_STEPS)
+    estimator = with_mean_commands(estimator, base)
+    if not quick:
+        estimator, base = settled(estimator, base)
+    return Found(problem=estimator.problem, base_estimator=estimator, base=base, best=base,
+                 estimator=estimator, horizon=horizon, base_horizon=horizon)  # fmt: skip

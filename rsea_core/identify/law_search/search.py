@@ -38,7 +38,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     too_fast,
     widened,
 )
-from rsea_core.identify.law_search.found import Entry, Found, Step
+from rsea_core.identify.law_search.found import Entry, Found, Step, from_growth
 from rsea_core.identify.law_search.gear_mesh import first_laws
 from rsea_core.identify.law_search.longer_windows import lengthened
 from rsea_core.identify.law_search.pruning import pruned, without_weak_end
@@ -71,15 +71,14 @@ from rsea_core.identify.multistep.criteria import (
     PER_VALUE,
     PULSE_CHOICE,
     PULSE_RATIO,
-    SEARCH_STEPS,
     SECOND_STARTS,
     WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import Experiment
-from rsea_core.identify.multistep.horizons import likelier, with_fine_steps
+from rsea_core.identify.multistep.horizons import likelier
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER, nuisances
-from rsea_core.identify.multistep.timing_choice import parameters_with_timing, with_mean_commands
+from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.recordings.case import Case
 
@@ -100,15 +99,8 @@ def begun(
         Free values of a gear's mesh that stands for a spring: the first law is in the gear.
     """
     h = Hypothesis(laws=(*nuisances(case), *mesh))
-    estimator, base, horizon = parameters_with_timing(
-        case, h, say, timing=timing, quick=quick or bool(mesh)
-    )
-    estimator, base = with_fine_steps(estimator, base, say, per_cycle=SEARCH_STEPS)
-    estimator = with_mean_commands(estimator, base)
-    if not quick:
-        estimator, base = settled(estimator, base)
-    return Found(problem=estimator.problem, base_estimator=estimator, base=base, best=base,
-                 estimator=estimator, horizon=horizon, base_horizon=horizon)  # fmt: skip
+    growth = parameters_with_timing(case, h, say, timing=timing, quick=quick or bool(mesh))
+    return from_growth(growth, say, quick=quick)
 
 
 def searched(

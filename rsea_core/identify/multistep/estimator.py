@@ -34,6 +34,7 @@ ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
 NEGLIGIBLE = 0.05  # units that no step is worth
 FORESEEN = 0.5  # share of the foreseen fall, below which a corrected Jacobian is taken anew
 CORRECTIONS = 4  # of one Jacobian
+BEYOND_FORESEEN = 3.0  # times the fall that a Jacobian foresees, which a fit hardly exceeds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,8 +198,9 @@ class Estimator:
         return level, columns
 
     def fit(
-        self, h: Hypothesis, x: NDArray, *, iterations: int = 8, fine: bool = False
-    ) -> Estimate:
+        self, h: Hypothesis, x: NDArray, *, iterations: int = 8, fine: bool = False,
+        least: float = np.inf,
+    ) -> Estimate:  # fmt: skip
         """Levenberg-Marquardt from x.
 
         Simulations for a Jacobian are most of the work. As long as steps lower the cost as
@@ -211,6 +213,9 @@ class Estimator:
             New Jacobians, at most.
         fine : bool
             On to where no step lowers the cost, with fine differences.
+        least : float
+            Cost that the fit must reach to be of use: it ends where a new Jacobian foresees less
+            than a third of the fall to there.
         """
         low, high = self.problem.bounds(h)
         x = np.clip(x, low, high)
@@ -218,6 +223,8 @@ class Estimator:
         damping, arrived, taken = 1e-3, False, 0
         while taken < iterations and np.isfinite(cost) and not arrived:
             level, columns = self.jacobian(h, x, fine=fine)
+            if least < cost and cost - self._most_fall(h, x, level, columns) > least:
+                break
             taken, corrected = taken + 1, 0
             while True:
                 fresh = corrected == 0
@@ -257,6 +264,12 @@ class Estimator:
             np.diag(weight**2) + self.tempering * A,
             weight**2 * (x - centre) + self.tempering * g,
         )
+
+    def _most_fall(self, h: Hypothesis, x: NDArray, level, columns) -> float:
+        """Fall of the cost that a fit from x hardly exceeds."""
+        A, g = self._normal(h, x, level, columns)
+        v = damped_step(x, A, g, UNDAMPED, *self.problem.bounds(h)) - x
+        return BEYOND_FORESEEN * -float(g @ v + 0.5 * v @ A @ v)
 
     def _best_step(
         self, h: Hypothesis, x: NDArray, cost: float, A: NDArray, g: NDArray, damping: float,

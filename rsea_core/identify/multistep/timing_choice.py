@@ -51,22 +51,37 @@ def parameters_with_timing(
 
     A timing that is given is not judged. Where parameters leave dependent innovations, the fit may
     have ended in a wrong place, from which another timing cannot be judged either: the horizons are
-    grown again from output errors (`_grown_from_output_errors`).
+    grown again from output errors (`grown_again`).
     """
+    first = first_growth(case, h, say, timing=timing, quick=quick)
+    return first if quick or not in_doubt(first) else grown_again(first, case, say, timing=timing)
+
+
+def first_growth(
+    case: Case, h: Hypothesis, say, *, timing: CommandTiming | None = None, quick: bool = False
+) -> Growth:
+    """The same without another growth where the fit is in doubt; its timing is not judged then."""
     first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
-    if quick or not _in_doubt(first):
-        if timing is not None:
-            return first
-        better = (*with_better_timing(*first[:2], case, say), first[2])
-        timing = better[0].problem.timing
-        if timing == AS_LOGGED:
-            return better
-        problem = MultistepProblem(case, timing=timing, steps=better[0].problem.steps)
-        first = parameters(problem, h, say)  # grown with this timing
-        first = best_of(better, first)
-        first = (*with_better_timing(*first[:2], case, say), first[2])  # with the new values
-        if quick or not _in_doubt(first):
-            return first
+    if timing is not None or (in_doubt(first) and not quick):
+        return first
+    better = in_better_timing(first, case, say)
+    timing = better[0].problem.timing
+    if timing == AS_LOGGED:
+        return better
+    problem = MultistepProblem(case, timing=timing, steps=better[0].problem.steps)
+    again = parameters(problem, h, say)  # grown with this timing
+    return in_better_timing(best_of(better, again), case, say)  # with the new values
+
+
+def in_better_timing(growth: Growth, case: Case, say) -> Growth:
+    """A growth's end, refitted with the timing of the commands that is likeliest there."""
+    return (*with_better_timing(*growth[:2], case, say), growth[2])
+
+
+def grown_again(
+    first: Growth, case: Case, say, *, timing: CommandTiming | None = None
+) -> Growth:  # fmt: skip
+    """The best of a growth in doubt and of growths from output errors."""
     say("the fit may be in a wrong place: grown again from output errors")
     return best_of(first, *_grown_from_output_errors(first, case, say, timing))
 
@@ -94,14 +109,14 @@ def _grown_from_output_errors(
             if _behind(unsmoothed or ends[used], problem) > most:
                 continue
         ends[each] = parameters(problem, h, say, output_errors=True, delay=delay)
-        if each == used and _ends_alike(first, ends[used]):
+        if each == used and ends_alike(first, ends[used]):
             least = -LINEAR_GAIN
         if each.smooth:  # from output errors the noise may end in a local maximum
             more.append(parameters(problem, h, say, delay=delay))
     return [*ends.values(), *more]
 
 
-def _ends_alike(a: Growth, b: Growth) -> bool:
+def ends_alike(a: Growth, b: Growth) -> bool:
     """Whether two growths reach the same horizon with almost the same cost."""
     share = min(a[0].tempering, b[0].tempering)
     costs = [share * fit.likelihood + fit.prior_cost for _, fit, _ in (a, b)]
@@ -117,7 +132,7 @@ def _behind(growth: Growth, problem: MultistepProblem) -> float:
     return other.fit(h, fit.x).cost - fit.cost
 
 
-def _in_doubt(growth: Growth) -> bool:
+def in_doubt(growth: Growth) -> bool:
     """Whether unknown torques may explain what other values would."""
     estimator, fit, _ = growth
     error = relative_error(estimator, fit.hypothesis, fit.x)

@@ -66,11 +66,16 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     Found or None
         Where none does: the one law that leaves little more, for where windows show nothing.
     """
+    return concluded(*laws_added(found, say), say, again=again)
+
+
+def laws_added(found: Found, say) -> tuple[Found, WholeSearch]:
+    """Parameters alone over whole recordings, and laws added as long as they leave too much."""
     own = in_sensor_noise(found.base_estimator, found.base)
     own, plain, left = parameters_alone(own, found.base, say)
     other = with_single_zeros(found, own, plain, say)
     if other is not found:
-        return with_whole_runs(other, say, again=again)
+        return laws_added(other, say)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
     if left <= SOUND and is_coloured(found.base_estimator):
@@ -78,16 +83,25 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
         found = replace(found, left_by_parameters=left, sound_below=SOUND_IN_LEFT_NOISE)
     found = replace(found, excess=excess(own, plain.hypothesis, plain.x))
     say(f"whole recordings: these errors cost {found.excess:.0f} units more than noise")
-    if (found.sound and not found.beyond_noise) or not left < np.inf:
-        return found, None
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
+    if _needs_no_law(found):
+        return found, search
     for _ in range(1 if found.sound else WHOLE_LAWS):
         if search.left() <= search.enough or not search.add(say):
             break
         search.prune(say)
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
-            return with_whole_runs(other, say, again=again)
+            return laws_added(other, say)
+    return found, search
+
+
+def concluded(
+    found: Found, search: WholeSearch, say, *, again: bool = True
+) -> tuple[Found, Found | None]:
+    """What laws added to parameters alone show, as `with_whole_runs`."""
+    if _needs_no_law(found):
+        return found, None
     if not found.sound:
         search = search.begun_at_bound(say) or search
     if search.left() <= search.enough:
@@ -101,6 +115,32 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
         return other
     return (found if nearly else replace(found, by_whole_runs=first_law(found, search))), nearly
+
+
+def of_first_growth(found: Found, search: WholeSearch, say) -> Found | None:
+    """What laws added to the first growth of windows show, if no other growth is needed.
+
+    None if laws are not complete, if values are far from the rig file's, or if the recordings are
+    likelier with commands at other times: a growth in doubt may have ended in a wrong place.
+    """
+    if not search.left() <= search.enough:
+        return None
+    if not _needs_no_law(found):
+        found, _ = _finished(found, search, say, again=False) or (found, None)
+        if not found.complete:
+            return None
+    own, fit, case = search.own, search.fit, search.own.problem.case
+    if far_from_rig(own.problem, fit.x):
+        return None
+    for timing in timings(case, own.problem.timing):
+        if _with_timing(own, timing, fit.hypothesis, fit.x).cost < fit.cost - search.doubt():
+            return None
+    return found
+
+
+def _needs_no_law(found: Found) -> bool:
+    """Whether parameters alone leave no more than noise, or predict no whole recording."""
+    return (found.sound and not found.beyond_noise) or not found.left_by_parameters < np.inf
 
 
 def _finished(

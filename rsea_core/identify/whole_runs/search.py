@@ -27,6 +27,7 @@ from rsea_core.identify.multistep.criteria import (
     ALIKE_OF_GAIN,
     CLOSE_TO_BEST,
     EXPLAINED,
+    LEAST_OF_BEST,
     LEAST_EXCESS,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
@@ -44,8 +45,9 @@ from rsea_core.identify.multistep.criteria import (
     WHOLE_LAWS,
     WHOLE_RIVALS,
 )
-from rsea_core.identify.multistep.estimator import Estimate
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import ANGLES
+from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, in_steps_of
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
 from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
 from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
@@ -122,7 +124,8 @@ class WholeSearch(TakenLaws):
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
         candidates = most_promising(screened) + self.of_many_starts(left)
         candidates += of_other_effects(screened, candidates)
-        trials = self.fitted(self.fit, candidates, iterations=QUICK_ITERATIONS)
+        quick = in_coarse_steps(self.own, self.fit, self.left())
+        trials = self.fitted(self.fit, candidates, quick, iterations=QUICK_ITERATIONS)
         least = CLOSE_TO_BEST * max((t.gain for t in trials), default=0.0)
         trials = [self.continued(t) if t.gain > least else t for t in trials]
         return sorted(trials, key=lambda t: -t.gain)
@@ -142,15 +145,26 @@ class WholeSearch(TakenLaws):
         return screen(self.found.base_estimator, self.found.base, laws) if laws else []
 
     def fitted(
-        self, base: Estimate, candidates: Sequence[Candidate], iterations: int = 8
-    ) -> list[Trial]:
+        self, base: Estimate, candidates: Sequence[Candidate], quick: Estimator | None = None,
+        iterations: int = 8,
+    ) -> list[Trial]:  # fmt: skip
         """Candidates fitted beside a fit, best first; without those that end at a bound.
 
-        The best of these is kept (`best_at_bound`) where it would be the first law taken.
+        The best of these is kept (`best_at_bound`) where it would be the first law taken. A fit
+        ends where it can gain no more than a share of the best gain so far.
+
+        Parameters
+        ----------
+        quick : Estimator or None
+            In which candidates are fitted (`in_coarse_steps`); their gains are the search's own.
         """
+        own = self.own if quick is None else quick
+        start = base if own is self.own else in_steps_of(own, base)
         found, bounded = [], []
         for c in candidates:
-            fit = fitted(self.own, base, c, factors=SIZES, iterations=iterations)
+            least = start.cost - LEAST_OF_BEST * max((t.gain for t in found), default=0.0)
+            fit = fitted(own, start, c, factors=SIZES, iterations=iterations, least=least)
+            fit = fit if own is self.own else in_steps_of(self.own, fit)
             gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
             if np.isfinite(gain):
                 left = misfit(self.own, fit.hypothesis, fit.x)

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted
 from rsea_core.identify.law_search.screening import screen
-from rsea_core.identify.multistep.criteria import PER_VALUE, SHORT, WHOLE_RIVALS
+from rsea_core.identify.multistep.criteria import CLOSE_TO_BEST, PER_VALUE, SHORT, WHOLE_RIVALS
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import with_windows
 from rsea_core.identify.whole_runs.forms import most_promising
@@ -33,7 +33,9 @@ def rivals_of_short_windows(
     short = own.having(with_windows(own, SHORT))
     base = short.fit(plain.hypothesis, plain.x)
     best = short.fit(taken.hypothesis, taken.x)
-    rough = [(c, fitted(short, base, c)) for c in most_promising(screen(short, base, laws))]
+    promising = most_promising(screen(short, base, laws))
+    least = base.cost - CLOSE_TO_BEST * (base.cost - best.cost)
+    rough = [(c, fitted(short, base, c, least=least)) for c in promising]
     better = sorted((pair for pair in rough if pair[1].cost < best.cost), key=lambda p: p[1].cost)
     found = []
     for c, begun in better[:WHOLE_RIVALS]:

@@ -1,0 +1,38 @@
+"""Engine steps in which candidates of whole recordings are compared first.
+
+The first candidates are compared by errors of many noise deviations. The engine may err by a share
+of these: an undivided row then takes a third of the steps and less.
+"""
+
+from dataclasses import replace
+
+from rsea_core.identify.multistep.criteria import COARSE_SHARE, COARSE_STEPS
+from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.multistep.experiment import EngineSteps
+from rsea_core.identify.multistep.horizons import in_steps
+from rsea_core.identify.whole_runs.parameters_alone import step_error
+
+
+def in_coarse_steps(own: Estimator, fit: Estimate, left: float) -> Estimator:
+    """The estimator in the longest steps that change its errors by a small share of the misfit.
+
+    Parameters
+    ----------
+    left : float
+        Misfit of the fit [noise deviations].
+    """
+    used = own.problem.steps
+    for per_cycle in COARSE_STEPS:
+        steps = EngineSteps(per_cycle, parts_of_row=1)
+        if steps.per_cycle / steps.fineness >= used.per_cycle / used.fineness:
+            continue
+        coarse = in_steps(own, steps)
+        if step_error(own, coarse, fit) < COARSE_SHARE * left:
+            return coarse
+    return own
+
+
+def in_steps_of(own: Estimator, fit: Estimate) -> Estimate:
+    """A fit with the costs that another estimator gives its values."""
+    cost = float(own.costs([(fit.hypothesis, fit.x)])[0])
+    return replace(fit, cost=cost, likelihood=(cost - fit.prior_cost) / own.tempering)
