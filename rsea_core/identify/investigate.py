@@ -27,7 +27,6 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.horizons import likelier, relative_error
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.timing_choice import (
-    ends_alike,
     first_growth,
     grown_again,
     in_better_timing,
@@ -102,11 +101,9 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
     end = of_first_growth(found, search, say)
     if end is not None:
         return end, None
-    best = grown_again(first, case, say)
-    same = best[0].problem.timing == better[0].problem.timing and ends_alike(best, better)
-    if same and search.left() > search.enough:
-        return concluded(found, search, say)
-    return with_whole_runs(from_growth(best, say), say)
+    finished = search.left() <= search.enough
+    again = from_growth(grown_again(first, case, say), say)
+    return concluded(*laws_added(again, say, known=None if finished else search), say)
 
 
 def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:

@@ -15,6 +15,7 @@ APPLIED_CURRENT = 3.0  # deviations of the sensor: a larger error is that of ano
 LINEAR_GAIN = 3.0  # by which a linearly moving command must be better than a held one
 UNLIKELY_TIMING = 500.0  # units behind: a timing with which no horizons are grown
 SAME_END = 3.0  # units: growths from different starts whose ends differ by less end alike
+ALIKE_EXCESS = 1e-3  # of the excess: searches of whole recordings that begin at such costs are one
 TURNS = 0.1  # of the rows: a command that reverses in fewer is not smoothed
 FAST_SHARE = 0.2  # of what smoothing removes, that acts: of five commands in a row one is logged
 TIMING_DOUBT = 10.0  # units: a difference that does not tell a linear command from a held one

@@ -109,14 +109,14 @@ def _grown_from_output_errors(
             if _behind(unsmoothed or ends[used], problem) > most:
                 continue
         ends[each] = parameters(problem, h, say, output_errors=True, delay=delay)
-        if each == used and ends_alike(first, ends[used]):
+        if each == used and _ends_alike(first, ends[used]):
             least = -LINEAR_GAIN
         if each.smooth:  # from output errors the noise may end in a local maximum
             more.append(parameters(problem, h, say, delay=delay))
     return [*ends.values(), *more]
 
 
-def ends_alike(a: Growth, b: Growth) -> bool:
+def _ends_alike(a: Growth, b: Growth) -> bool:
     """Whether two growths reach the same horizon with almost the same cost."""
     share = min(a[0].tempering, b[0].tempering)
     costs = [share * fit.likelihood + fit.prior_cost for _, fit, _ in (a, b)]

@@ -15,6 +15,7 @@ from rsea_core.identify.law_search.search import begun, laws_of
 from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.command_timing import CommandTiming, timings
 from rsea_core.identify.multistep.criteria import (
+    ALIKE_EXCESS,
     COMPLETE,
     COMPLETE_SHARE,
     EXPLAINED,
@@ -23,6 +24,7 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     NEARLY_EXPLAINED,
+    SAME_END,
     SHAPE_SHARE,
     SOUND,
     SOUND_IN_LEFT_NOISE,
@@ -69,8 +71,14 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     return concluded(*laws_added(found, say), say, again=again)
 
 
-def laws_added(found: Found, say) -> tuple[Found, WholeSearch]:
-    """Parameters alone over whole recordings, and laws added as long as they leave too much."""
+def laws_added(found: Found, say, *, known: WholeSearch | None = None) -> tuple[Found, WholeSearch]:
+    """Parameters alone over whole recordings, and laws added as long as they leave too much.
+
+    Parameters
+    ----------
+    known : WholeSearch or None
+        Of another start. It is continued if parameters alone end as well with its values.
+    """
     own = in_sensor_noise(found.base_estimator, found.base)
     own, plain, left = parameters_alone(own, found.base, say)
     other = with_single_zeros(found, own, plain, say)
@@ -84,6 +92,9 @@ def laws_added(found: Found, say) -> tuple[Found, WholeSearch]:
     found = replace(found, excess=excess(own, plain.hypothesis, plain.x))
     say(f"whole recordings: these errors cost {found.excess:.0f} units more than noise")
     search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
+    if known is not None and _begins_alike(known, search):
+        known.found = found
+        return found, known
     if _needs_no_law(found):
         return found, search
     for _ in range(1 if found.sound else WHOLE_LAWS):
@@ -136,6 +147,15 @@ def of_first_growth(found: Found, search: WholeSearch, say) -> Found | None:
         if _with_timing(own, timing, fit.hypothesis, fit.x).cost < fit.cost - search.doubt():
             return None
     return found
+
+
+def _begins_alike(known: WholeSearch, search: WholeSearch) -> bool:
+    """Whether parameters alone cost as much with the values and the timing of another search."""
+    if known.own.problem.timing != search.own.problem.timing:
+        return False
+    h, x = search.plain.hypothesis, known.plain.x
+    more = float(search.own.costs([(h, x)])[0]) - search.plain.cost
+    return abs(more) < SAME_END + ALIKE_EXCESS * search.excess()
 
 
 def _needs_no_law(found: Found) -> bool:
