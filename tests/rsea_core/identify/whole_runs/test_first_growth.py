@@ -1,4 +1,4 @@
-"""Complete laws of whole recordings make other growths of windows needless, with the right timing."""
+"""Complete laws of whole recordings, with the right timing, make other growths needless."""
 
 from dataclasses import replace
 
