@@ -12,6 +12,7 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, huber_weights
 from rsea_core.identify.multistep.steps import (
+    LONGEST_STEP,
     PROBE,
     UNDAMPED,
     Start,
@@ -34,6 +35,7 @@ ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
 NEGLIGIBLE = 0.05  # units that no step is worth
 FORESEEN = 0.5  # share of the foreseen fall, below which a corrected Jacobian is taken anew
 CORRECTIONS = 4  # of one Jacobian
+ALMOST = 0.99  # of the longest step that is made
 BEYOND_FORESEEN = 3.0  # times the fall that a Jacobian foresees, which a fit hardly exceeds
 
 
@@ -266,9 +268,14 @@ class Estimator:
         )
 
     def _most_fall(self, h: Hypothesis, x: NDArray, level, columns) -> float:
-        """Fall of the cost that a fit from x hardly exceeds."""
+        """Fall of the cost that a fit from x hardly exceeds; inf where a step ends far from x.
+
+        So far away a Jacobian foresees nothing.
+        """
         A, g = self._normal(h, x, level, columns)
         v = damped_step(x, A, g, UNDAMPED, *self.problem.bounds(h)) - x
+        if np.max(np.abs(v) / (LONGEST_STEP + np.abs(x)), initial=0.0) > ALMOST:
+            return np.inf
         return BEYOND_FORESEEN * -float(g @ v + 0.5 * v @ A @ v)
 
     def _best_step(

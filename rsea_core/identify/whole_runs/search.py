@@ -162,7 +162,8 @@ class WholeSearch(TakenLaws):
         start = base if own is self.own else in_steps_of(own, base)
         found, bounded = [], []
         for c in candidates:
-            least = start.cost - LEAST_OF_BEST * max((t.gain for t in found), default=0.0)
+            gained = max((t.gain for t in found), default=0.0)
+            least = start.cost - LEAST_OF_BEST * gained if gained > 0.0 else np.inf
             fit = fitted(own, start, c, factors=SIZES, iterations=iterations, least=least)
             fit = fit if own is self.own else in_steps_of(self.own, fit)
             gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
