@@ -52,7 +52,8 @@ from rsea_core.identify.multistep.tracks import prepared
 
 def fitted(
     estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None, *,
-    factors: Sequence[float] = (1.0, 0.5), iterations: int = 8, least: float = np.inf,
+    factors: Sequence[float] = (1.0, 0.5), iterations: int = 8,
+    target_cost: float = np.inf,
 ) -> Estimate:  # fmt: skip
     """A candidate fitted from its best size, beside what is fitted already.
 
@@ -62,7 +63,7 @@ def fitted(
         In short windows, where a law that is far off still predicts in phase: a further start.
     factors : sequence of float
         Of the size that the screening saw: starts, beside its own.
-    least : float
+    target_cost : float
         Cost that the fit must reach to be of use (`Estimator.fit`).
     """
     problem = estimator.problem
@@ -80,7 +81,7 @@ def fitted(
         trials.append((h, begun.x))
     costs = estimator.costs(trials)
     begin = trials[int(np.argmin(costs))][1]
-    return estimator.fit(h, begin, iterations=iterations, least=least)
+    return estimator.fit(h, begin, iterations=iterations, target_cost=target_cost)
 
 
 def settled(

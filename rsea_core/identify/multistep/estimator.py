@@ -35,8 +35,8 @@ ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
 NEGLIGIBLE = 0.05  # units that no step is worth
 FORESEEN = 0.5  # share of the foreseen fall, below which a corrected Jacobian is taken anew
 CORRECTIONS = 4  # of one Jacobian
-ALMOST = 0.99  # of the longest step that is made
-BEYOND_FORESEEN = 3.0  # times the fall that a Jacobian foresees, which a fit hardly exceeds
+SHORTENED = 0.99  # of the longest step: a step of this length was shortened
+BEYOND_FORESEEN = 3.0  # times the decrease that a Jacobian predicts, which a fit hardly exceeds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,7 +201,7 @@ class Estimator:
 
     def fit(
         self, h: Hypothesis, x: NDArray, *, iterations: int = 8, fine: bool = False,
-        least: float = np.inf,
+        target_cost: float = np.inf,
     ) -> Estimate:  # fmt: skip
         """Levenberg-Marquardt from x.
 
@@ -215,9 +215,9 @@ class Estimator:
             New Jacobians, at most.
         fine : bool
             On to where no step lowers the cost, with fine differences.
-        least : float
-            Cost that the fit must reach to be of use: it ends where a new Jacobian foresees less
-            than a third of the fall to there.
+        target_cost : float
+            Cost that the fit must reach to be of use. It ends where a new Jacobian predicts less
+            than a third of the decrease that is needed, unless the step is of the greatest length.
         """
         low, high = self.problem.bounds(h)
         x = np.clip(x, low, high)
@@ -225,7 +225,8 @@ class Estimator:
         damping, arrived, taken = 1e-3, False, 0
         while taken < iterations and np.isfinite(cost) and not arrived:
             level, columns = self.jacobian(h, x, fine=fine)
-            if least < cost and cost - self._most_fall(h, x, level, columns) > least:
+            needed = cost - target_cost
+            if needed > 0.0 and needed > self._largest_decrease(h, x, level, columns):
                 break
             taken, corrected = taken + 1, 0
             while True:
@@ -267,14 +268,15 @@ class Estimator:
             weight**2 * (x - centre) + self.tempering * g,
         )
 
-    def _most_fall(self, h: Hypothesis, x: NDArray, level, columns) -> float:
-        """Fall of the cost that a fit from x hardly exceeds; inf where a step ends far from x.
+    def _largest_decrease(self, h: Hypothesis, x: NDArray, level, columns) -> float:
+        """Decrease of the cost that a fit from x hardly exceeds.
 
-        So far away a Jacobian foresees nothing.
+        inf where the step is of the greatest length: a Jacobian that far from the minimum predicts
+        no decrease.
         """
         A, g = self._normal(h, x, level, columns)
         v = damped_step(x, A, g, UNDAMPED, *self.problem.bounds(h)) - x
-        if np.max(np.abs(v) / (LONGEST_STEP + np.abs(x)), initial=0.0) > ALMOST:
+        if np.max(np.abs(v) / (LONGEST_STEP + np.abs(x)), initial=0.0) > SHORTENED:
             return np.inf
         return BEYOND_FORESEEN * -float(g @ v + 0.5 * v @ A @ v)
 

@@ -50,7 +50,7 @@ def parameters_with_timing(
     """The parameters, and when commands act: held or linear between rows, at the stamps or not.
 
     A timing that is given is not judged. Where parameters leave dependent innovations, the fit may
-    have ended in a wrong place, from which another timing cannot be judged either: the horizons are
+    have ended at wrong values, from which another timing cannot be judged either: the horizons are
     grown again from output errors (`grown_again`).
     """
     first = first_growth(case, h, say, timing=timing, quick=quick)
@@ -82,7 +82,7 @@ def grown_again(
     first: Growth, case: Case, say, *, timing: CommandTiming | None = None
 ) -> Growth:  # fmt: skip
     """The best of a growth in doubt and of growths from output errors."""
-    say("the fit may be in a wrong place: grown again from output errors")
+    say("the fit may have ended at wrong values: grown again from output errors")
     return best_of(first, *_grown_from_output_errors(first, case, say, timing))
 
 

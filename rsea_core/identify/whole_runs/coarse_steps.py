@@ -1,7 +1,8 @@
 """Engine steps in which candidates of whole recordings are compared first.
 
-The first candidates are compared by errors of many noise deviations. The engine may err by a share
-of these: an undivided row then takes a third of the steps and less.
+Parameters alone often leave errors of many noise deviations. While candidates are compared by
+these, the error of the engine may be a small share of them: one row then needs a third of the
+steps or fewer.
 """
 
 from dataclasses import replace
@@ -32,7 +33,7 @@ def in_coarse_steps(own: Estimator, fit: Estimate, left: float) -> Estimator:
     return own
 
 
-def in_steps_of(own: Estimator, fit: Estimate) -> Estimate:
+def with_costs_of(own: Estimator, fit: Estimate) -> Estimate:
     """A fit with the costs that another estimator gives its values."""
     cost = float(own.costs([(fit.hypothesis, fit.x)])[0])
     return replace(fit, cost=cost, likelihood=(cost - fit.prior_cost) / own.tempering)

@@ -77,7 +77,8 @@ def laws_added(found: Found, say, *, known: WholeSearch | None = None) -> tuple[
     Parameters
     ----------
     known : WholeSearch or None
-        Of another start. It is continued if parameters alone end as well with its values.
+        From another growth of windows. It is continued if parameters alone cost as much with its
+        values.
     """
     own = in_sensor_noise(found.base_estimator, found.base)
     own, plain, left = parameters_alone(own, found.base, say)
@@ -132,7 +133,7 @@ def of_first_growth(found: Found, search: WholeSearch, say) -> Found | None:
     """What laws added to the first growth of windows show, if no other growth is needed.
 
     None if laws are not complete, if values are far from the rig file's, or if the recordings are
-    likelier with commands at other times: a growth in doubt may have ended in a wrong place.
+    likelier with commands at other times: a growth in doubt may have ended at wrong values.
     """
     if not search.left() <= search.enough:
         return None

@@ -47,7 +47,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import ANGLES
-from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, in_steps_of
+from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, with_costs_of
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
 from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
 from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
@@ -156,16 +156,17 @@ class WholeSearch(TakenLaws):
         Parameters
         ----------
         quick : Estimator or None
-            In which candidates are fitted (`in_coarse_steps`); their gains are the search's own.
+            In which candidates are fitted (`in_coarse_steps`); their gains are those of the
+            search's own estimator.
         """
         own = self.own if quick is None else quick
-        start = base if own is self.own else in_steps_of(own, base)
+        start = base if own is self.own else with_costs_of(own, base)
         found, bounded = [], []
         for c in candidates:
             gained = max((t.gain for t in found), default=0.0)
-            least = start.cost - LEAST_OF_BEST * gained if gained > 0.0 else np.inf
-            fit = fitted(own, start, c, factors=SIZES, iterations=iterations, least=least)
-            fit = fit if own is self.own else in_steps_of(self.own, fit)
+            target = start.cost - LEAST_OF_BEST * gained if gained > 0.0 else np.inf
+            fit = fitted(own, start, c, factors=SIZES, iterations=iterations, target_cost=target)
+            fit = fit if own is self.own else with_costs_of(self.own, fit)
             gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
             if np.isfinite(gain):
                 left = misfit(self.own, fit.hypothesis, fit.x)

@@ -34,8 +34,8 @@ def rivals_of_short_windows(
     base = short.fit(plain.hypothesis, plain.x)
     best = short.fit(taken.hypothesis, taken.x)
     promising = most_promising(screen(short, base, laws))
-    least = base.cost - CLOSE_TO_BEST * (base.cost - best.cost)
-    rough = [(c, fitted(short, base, c, least=least)) for c in promising]
+    target = base.cost - CLOSE_TO_BEST * (base.cost - best.cost)
+    rough = [(c, fitted(short, base, c, target_cost=target)) for c in promising]
     better = sorted((pair for pair in rough if pair[1].cost < best.cost), key=lambda p: p[1].cost)
     found = []
     for c, begun in better[:WHOLE_RIVALS]:

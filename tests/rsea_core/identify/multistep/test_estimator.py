@@ -21,7 +21,7 @@ def case(tmp_path_factory):
     return pendulum_case(folder, LoadFriction(coulomb_Nm=2e-3), seed=1)
 
 
-def fitted(case, off: float = 0.0, least: float = np.inf):
+def fitted(case, off: float = 0.0, target_cost: float = np.inf):
     """A fit from values so many tolerances off the rig file's, and the Jacobians that it took."""
     problem = MultistepProblem(case)
     estimator = Estimator(problem, [initial_track(e) for e in problem.fitted])
@@ -31,7 +31,7 @@ def fitted(case, off: float = 0.0, least: float = np.inf):
     taken = []
     jacobian = estimator.jacobian
     estimator.jacobian = lambda *given, **how: taken.append(1) or jacobian(*given, **how)
-    return estimator, estimator.fit(h, x, iterations=30, least=least), len(taken)
+    return estimator, estimator.fit(h, x, iterations=30, target_cost=target_cost), len(taken)
 
 
 def test_a_fit_that_has_arrived_has_no_slope_and_a_second_fit_gains_nothing(case):
@@ -53,9 +53,9 @@ def test_corrected_jacobians_lead_to_the_same_optimum_with_fewer_new_ones(case, 
 
 def test_a_fit_that_cannot_reach_the_cost_needed_ends_and_one_that_can_is_unchanged(case):
     _, fit, taken = fitted(case, off=3.0)
-    _, other, same = fitted(case, off=3.0, least=fit.cost + 10.0)
+    _, other, same = fitted(case, off=3.0, target_cost=fit.cost + 10.0)
     assert (other.cost, same) == (fit.cost, taken)
-    _, early, fewer = fitted(case, off=3.0, least=fit.cost - 1e6)
+    _, early, fewer = fitted(case, off=3.0, target_cost=fit.cost - 1e6)
     assert not early.arrived
     assert fewer == 1 < taken
 

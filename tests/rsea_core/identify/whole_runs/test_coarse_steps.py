@@ -6,7 +6,7 @@ import pytest
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.identify.multistep.command_timing import CommandTiming
 from rsea_core.identify.multistep.criteria import COARSE_SHARE
-from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, in_steps_of
+from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, with_costs_of
 from rsea_core.identify.whole_runs.parameters_alone import step_error
 from rsea_core.identify.whole_runs.sensor_noise import misfit
 from tests.cases.one_axis import axis_recording
@@ -38,6 +38,6 @@ def test_steps_stay_where_coarse_ones_would_change_the_errors(axis):
 def test_a_fit_of_coarse_steps_is_judged_in_fine_ones(axis):
     own, plain = axis
     coarse = in_coarse_steps(own, plain, np.inf)
-    fit = in_steps_of(own, coarse.fit(plain.hypothesis, plain.x, iterations=2))
+    fit = with_costs_of(own, coarse.fit(plain.hypothesis, plain.x, iterations=2))
     assert fit.cost == own.costs([(fit.hypothesis, fit.x)])[0]
     assert fit.cost == pytest.approx(own.tempering * fit.likelihood + fit.prior_cost)
