@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from math import gcd, lcm
 from typing import ClassVar
 
 import numpy as np
@@ -80,7 +81,30 @@ def _further(what: str, wave: int):
     )
 
 
+def _of_slots_and_poles() -> set[int]:
+    """Cycles of cogging of three-phase motors with concentrated windings, by slots and poles.
+
+    Their least common multiple, where the winding can be symmetric (slots over three times their
+    common divisor with the pole pairs is whole) and a coil spans about a pole.
+
+    Source
+    ------
+    Zhu & Howe, Influence of design parameters on cogging torque in permanent magnet machines, IEEE
+    Trans. Energy Convers. 15 (2000) 407.
+    """
+    return {
+        lcm(slots, poles)
+        for slots in range(9, 49, 3)
+        for poles in range(6, 57, 2)
+        if 2 * poles <= 3 * slots <= 4.5 * poles and slots % (3 * gcd(slots, poles // 2)) == 0
+    }
+
+
 CYCLES_TRIED = tuple(range(1, 49))
+DETENTS = {50, 100, 200, 400}  # of stepping motors with 50 and 100 teeth
+MANY_CYCLES = tuple(
+    c for c in sorted(_of_slots_and_poles() | DETENTS) if max(CYCLES_TRIED) < c <= max(DETENTS)
+)
 PERIODS_TRIED = 60  # in the travel of a linear motor
 
 
@@ -243,6 +267,9 @@ class MotorCogging(Term):
         if direct and typical.relative:
             return linear_motor_cogging(typical)
         found = [cogging(typical, (c,)) for c in CYCLES_TRIED if typical.motor_passes(c)]
+        if typical.relative:
+            many = [cogging(typical, (c,)) for c in MANY_CYCLES if typical.rows_show(c)]
+            found += [replace(law, follows=True) for law in many]  # screened along the motion
         return [w for law in found for w in with_harmonic(law)] if typical.relative else found
 
     @classmethod

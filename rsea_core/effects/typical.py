@@ -47,6 +47,8 @@ class TypicalMagnitudes:
         Whether a recording begins with a deflected spring.
     spans : mapping
         Standard deviation (of the largest), and duration [s] of each column.
+    row_s : float
+        Shortest time between readings of a recording.
     """
 
     torque_Nm: float
@@ -68,6 +70,7 @@ class TypicalMagnitudes:
     time_s: float = 0.25
     begins_deflected: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    row_s: float = 0.0
 
     def like_inertia(self, bench: float) -> float:
         """An inertia at the output [kg m2], as `like_speed`: its torque in the motion for one."""
@@ -96,11 +99,17 @@ class TypicalMagnitudes:
 
     def motor_passes(self, cycles: float) -> bool:
         """Whether the motor passes enough cycles of so many a turn to tell them from a bend."""
-        ratio = (self.rig.gear_ratio if self.rig is not None else None) or 1.0
-        travel = RANGE * self.angle_rad * ratio
+        travel = RANGE * self.angle_rad * self._ratio
         return not self.relative or cycles * travel > LEAST_CYCLES * 2.0 * np.pi
+
+    def rows_show(self, cycles: float) -> bool:
+        """Whether two rows or more are in a cycle of so many in a turn, at the motor's speed."""
+        return cycles * self.speed_rad_per_s * self._ratio * self.row_s < np.pi
+
+    @property
+    def _ratio(self) -> float:
+        return (self.rig.gear_ratio if self.rig is not None else None) or 1.0
 
     @property
     def _gear(self) -> float:
-        ratio = (self.rig.gear_ratio if self.rig is not None else None) or 1.0
-        return ratio / BENCH_RATIO if self.relative else 1.0
+        return self._ratio / BENCH_RATIO if self.relative else 1.0

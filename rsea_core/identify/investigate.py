@@ -98,12 +98,16 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
         return with_whole_runs(from_growth(first, say), say)
     better = in_better_timing(first, case, say)
     found, search = laws_added(from_growth(better, say), say)
-    end = of_first_growth(found, search, say)
-    if end is not None:
+    end, doubted = of_first_growth(found, search, say)
+    if end is not None and not doubted:
         return end, None
     finished = search.left() <= search.enough
     again = from_growth(grown_again(first, case, say), say)
-    return concluded(*laws_added(again, say, known=None if finished else search), say)
+    found, nearly = concluded(*laws_added(again, say, known=None if finished else search), say)
+    if end is not None and end.complete and not (found.complete or found.sound):
+        say("whole recordings: the laws of the first growth of windows are complete")
+        return end, None
+    return found, nearly
 
 
 def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:

@@ -11,6 +11,14 @@ from rsea_core.recordings.recording import Recording
 from tests.cases.one_axis import axis_case, axis_rig
 
 
+def found_by_parameters(
+    estimator: Estimator, base: Estimate, horizon: float | None = None
+) -> Found:
+    """A search without laws so far."""
+    return Found(problem=estimator.problem, base_estimator=estimator, base=base,
+                 estimator=estimator, best=base, horizon=horizon)  # fmt: skip
+
+
 def searched_axis(
     folder, *recordings: Recording, timing: CommandTiming | None = None
 ) -> tuple[Found, Estimator, Estimate]:
@@ -18,7 +26,6 @@ def searched_axis(
     case = axis_case(folder, *recordings, rig=axis_rig())
     h = Hypothesis(laws=nuisances(case))
     estimator, base, horizon = parameters_with_timing(case, h, lambda text: None, timing=timing)
-    found = Found(problem=estimator.problem, base_estimator=estimator, base=base,
-                  estimator=estimator, best=base, horizon=horizon)  # fmt: skip
+    found = found_by_parameters(estimator, base, horizon)
     own = in_sensor_noise(estimator)
     return found, own, own.fit(base.hypothesis, base.x, iterations=12)

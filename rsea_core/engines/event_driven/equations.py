@@ -240,7 +240,7 @@ class Torques(NamedTuple):
     load_dry: float
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy")
 def derivative(plant, spring, fx, mode, command, stage, y, derivatives):
     """The torque tau_s; puts rates of the states and powers into the stage's row of slopes.
 

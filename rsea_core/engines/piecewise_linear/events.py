@@ -174,7 +174,7 @@ def _count(machine, work, mode, taken):
     times[3] += taken if mode.load == 0 and fx[e.LOAD_DRY] != 0.0 else 0.0
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", inline="always")
 def _advance(machine, modes, work, mode, region, command, at, length):
     """Move y on by a piece of a row, `at` seconds into it: (mode, region, status)."""
     row_s, left, level, event_count, fresh, slot = modes.row_s, length, 0, 0, True, -1
@@ -229,7 +229,7 @@ def _must_look(machine, mode, current):
     return looks or plant.drive == mp.CURRENT
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", inline="always")
 def advance_piece(machine, modes, work, mode, region, command, at, end):
     """From `at` to `end` seconds into a row, cut where the disturbance begins or ends."""
     plant, spring, fx, slack = machine.plant, machine.spring, machine.fx, SLIVER * modes.row_s

@@ -224,7 +224,7 @@ def _first(machine, rows, y):
     return fixed, mode, region, whole_row.now_of(machine, fixed, mode, region, -1, 0.0, y)
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", inline="always")
 def loop(machine, modes, work, rows, controller, parameters, state, log):
     """Run the sampled loop; `log` (N_LOG + behind, n) is filled. Returns (status, last row)."""
     plant, fx, y, time = machine.plant, machine.fx, work.y, rows.time

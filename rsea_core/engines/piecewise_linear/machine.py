@@ -21,7 +21,6 @@ from rsea_core.errors import SimulationError
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.spring_table import ANCHOR, C0, C1, C2, UPPER
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.numeric.arrays import read_only
 
 LINEAR = frozenset(
     (
@@ -194,4 +193,4 @@ def _lines(regions: NDArray) -> NDArray:
             kept[-1] = np.concatenate(([region[UPPER]], last[ANCHOR:]))
         else:
             kept.append(region)
-    return read_only(np.ascontiguousarray(kept))
+    return np.array(kept)  # not read-only: one type with `modes._read_system`'s, one compilation

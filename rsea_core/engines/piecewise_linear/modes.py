@@ -118,7 +118,7 @@ def _key_of(machine, mode, region, y):
     return key + 1
 
 
-@njit(error_model="numpy", forceinline=True)
+@njit(error_model="numpy", inline="always")
 def slot_of(machine, modes, work, mode, region):
     """Where a mode's matrices are, made if it is new; -1 where it is too fast for the row."""
     key = _key_of(machine, mode, region, work.y)

@@ -66,6 +66,7 @@ def own_magnitudes(case: Case) -> TypicalMagnitudes:
         command=_command(case), relative=True,
         begins_deflected=_begins_deflected(case, deflection or load / K),
         spans={column: _span(case, column) for column in FITTED},
+        row_s=min(r.sample_time_s for r in case.identification),
     )  # fmt: skip
 
 

@@ -125,6 +125,11 @@ class Found:
         return self.left_by_parameters < self.sound_below
 
     @property
+    def needs_no_law(self) -> bool:
+        """Whether parameters alone leave no more than noise, or predict no whole recording."""
+        return (self.sound and not self.beyond_noise) or not self.left_by_parameters < np.inf
+
+    @property
     def beyond_noise(self) -> bool:
         """Whether parameters alone leave errors of a cost that noise does not explain."""
         return self.excess >= LEAST_EXCESS

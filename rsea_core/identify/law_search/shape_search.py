@@ -70,6 +70,7 @@ def shapes(projection: Projection) -> list[Shape]:
     tracks = projection.estimator.tracks
     found = []
     for port in ports(tracks[0]):
+        scale = max(_scale(t, port) for t in tracks)  # one function for all recordings
         for signal, friction in _signals(tracks[0], port):
             values = [_signal(t, signal) for t in tracks]
             both = np.concatenate(values)
@@ -83,9 +84,6 @@ def shapes(projection: Projection) -> list[Shape]:
                 height[j] = 1.0
                 part = []
                 for t, v in zip(tracks, values, strict=True):
-                    scale = (
-                        t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")]
-                    )
                     size = scale * np.interp(v, nodes, height)
                     sign = -np.sign(t.motion[:, SPEED_OF[signal]]) if friction else 1.0
                     part.append(response(t, port, sign * size))
@@ -95,13 +93,16 @@ def shapes(projection: Projection) -> list[Shape]:
             if judged is None:
                 continue
             size, gain, held_out, deviation = judged
-            first = tracks[0].scale
-            scale = first.voltage_V if port == "V" else first.torque_Nm[int(port == "L")]
             found.append(
                 Shape(port=port, signal=signal, nodes=nodes, values=scale * size, gain=gain,
                       held_out=held_out, deviation=deviation, friction=friction)
             )  # fmt: skip
     return sorted(found, key=lambda s: -s.held_out)
+
+
+def _scale(t: Track, port: str) -> float:
+    """Typical torque [Nm] or voltage [V] at a port."""
+    return float(t.scale.voltage_V if port == "V" else t.scale.torque_Nm[int(port == "L")])
 
 
 def ports(t: Track) -> tuple[str, ...]:

@@ -117,6 +117,7 @@ NEEDS_NO_WINDOWS = 0.95  # of the same: a law that stands without a search in wi
 MOST_FITTED_RISE = 1.33  # of the rise that insulation bears: a fitted rise is uncertain
 NEIGHBOURS = 4  # of a law with a fixed number, as cycles in a turn: tried in its place
 MANY_STARTS = 20  # of a law: the one that windows show is a start too
+ORDERS = 2  # cycles of cogging in a turn, likeliest along the recorded motion: tried
 QUICK_ITERATIONS, CLOSE_TO_BEST = 3, 0.5  # of laws that a screening puts last; of the best gain
 LEAST_OF_BEST = 0.25  # of the best gain so far: a fit that cannot gain this is not continued
 COARSE_STEPS = (12.5, 25.0)  # per fastest cycle, of undivided rows: candidates are compared first

@@ -96,7 +96,7 @@ def laws_added(found: Found, say, *, known: WholeSearch | None = None) -> tuple[
     if known is not None and _begins_alike(known, search):
         known.found = found
         return found, known
-    if _needs_no_law(found):
+    if found.needs_no_law:
         return found, search
     for _ in range(1 if found.sound else WHOLE_LAWS):
         if search.left() <= search.enough or not search.add(say):
@@ -112,7 +112,7 @@ def concluded(
     found: Found, search: WholeSearch, say, *, again: bool = True
 ) -> tuple[Found, Found | None]:
     """What laws added to parameters alone show, as `with_whole_runs`."""
-    if _needs_no_law(found):
+    if found.needs_no_law:
         return found, None
     if not found.sound:
         search = search.begun_at_bound(say) or search
@@ -129,25 +129,31 @@ def concluded(
     return (found if nearly else replace(found, by_whole_runs=first_law(found, search))), nearly
 
 
-def of_first_growth(found: Found, search: WholeSearch, say) -> Found | None:
-    """What laws added to the first growth of windows show, if no other growth is needed.
+def of_first_growth(found: Found, search: WholeSearch, say) -> tuple[Found | None, bool]:
+    """What laws added to the first growth of windows show.
 
-    None if laws are not complete, if values are far from the rig file's, or if the recordings are
-    likelier with commands at other times: a growth in doubt may have ended at wrong values.
+    Returns
+    -------
+    Found or None
+        None if laws are not complete.
+    bool
+        Whether it is in doubt: values are far from the rig file's (a growth may end at wrong ones),
+        or the recordings are likelier with commands at other times.
     """
     if not search.left() <= search.enough:
-        return None
-    if not _needs_no_law(found):
-        found, _ = _finished(found, search, say, again=False) or (found, None)
-        if not found.complete:
-            return None
+        return None, True
+    if not found.needs_no_law:
+        end = _finished(found, search, say, again=False)
+        if end is None or not end[0].complete:
+            return None, True
+        found = end[0]
     own, fit, case = search.own, search.fit, search.own.problem.case
     if far_from_rig(own.problem, fit.x):
-        return None
+        return found, True
     for timing in timings(case, own.problem.timing):
         if _with_timing(own, timing, fit.hypothesis, fit.x).cost < fit.cost - search.doubt():
-            return None
-    return found
+            return found, True
+    return found, False
 
 
 def _begins_alike(known: WholeSearch, search: WholeSearch) -> bool:
@@ -157,11 +163,6 @@ def _begins_alike(known: WholeSearch, search: WholeSearch) -> bool:
     h, x = search.plain.hypothesis, known.plain.x
     more = float(search.own.costs([(h, x)])[0]) - search.plain.cost
     return abs(more) < SAME_END + ALIKE_EXCESS * search.excess()
-
-
-def _needs_no_law(found: Found) -> bool:
-    """Whether parameters alone leave no more than noise, or predict no whole recording."""
-    return (found.sound and not found.beyond_noise) or not found.left_by_parameters < np.inf
 
 
 def _finished(

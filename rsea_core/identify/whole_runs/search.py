@@ -35,6 +35,7 @@ from rsea_core.identify.multistep.criteria import (
     NEARLY_EXPLAINED,
     NEEDS_NO_WINDOWS,
     NEGLIGIBLE_INCREASE,
+    ORDERS,
     PER_VALUE,
     PRIOR_AMONG_ALIKE,
     PULSE_IN_WINDOWS,
@@ -49,6 +50,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import ANGLES
 from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, with_costs_of
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
+from rsea_core.identify.whole_runs.order_analysis import along_motion
 from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
 from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
 from rsea_core.identify.whole_runs.taken_laws import SIZES, TakenLaws, Trial
@@ -123,6 +125,7 @@ class WholeSearch(TakenLaws):
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(Projection(self.own, self.fit))[:PULSES]
         candidates = most_promising(screened) + self.of_many_starts(left)
+        candidates += along_motion(Projection(self.own, self.fit), left)[:ORDERS]
         candidates += of_other_effects(screened, candidates)
         quick = in_coarse_steps(self.own, self.fit, self.left())
         trials = self.fitted(self.fit, candidates, quick, iterations=QUICK_ITERATIONS)

@@ -101,19 +101,33 @@ def test_a_recording_held_out_shows_how_long_the_motor_rested_before_it(tmp_path
     assert pause_s >= 300.0 if fitted == 1 else pause_s == pytest.approx(1.0)
 
 
+def found_with(folder, term, key: str):
+    """A law that was added, of two recordings fitted and one held out."""
+    fitted = (axis_recording(term, seed=seed) for seed in (3, 4))
+    held = axis_recording(term, seed=5, role="validation")
+    found = begun(axis_case(folder, *fitted, held, rig=axis_rig()), None, lambda text: None)
+    add_all(found, [law for law in laws_of(found) if law.key == key], lambda text: None)
+    return found
+
+
+def times(found, factor: float, last: int):
+    """The search with its last values times a factor."""
+    x = found.best.x.copy()
+    x[-last:] *= factor
+    return replace(found, best=replace(found.best, x=x))
+
+
+@pytest.fixture(scope="module")
+def cogging(tmp_path_factory):
+    term = MotorCogging(amplitude_Nm=0.8, cycles_per_rev=7, phase_rad=0.8)
+    return found_with(tmp_path_factory.mktemp("cogging"), term, "motor-cogging/7 per turn")
+
+
 @pytest.mark.parametrize(("factor", "kept"), [(1.05, True), (-1.0, False)])
 def test_a_law_whose_axis_stops_at_other_detents_is_refuted_only_if_short_windows_do(
-    tmp_path, factor, kept
+    cogging, factor, kept
 ):
-    cogging = MotorCogging(amplitude_Nm=0.8, cycles_per_rev=7, phase_rad=0.8)
-    fitted = (axis_recording(cogging, seed=seed) for seed in (3, 4))
-    held = axis_recording(cogging, seed=5, role="validation")
-    found = begun(axis_case(tmp_path, *fitted, held, rig=axis_rig()), None, lambda text: None)
-    laws = [law for law in laws_of(found) if law.key == "motor-cogging/7 per turn"]
-    add_all(found, laws, lambda text: None)
-    x = found.best.x.copy()
-    x[-2:] *= factor  # both waves
-    found.best = replace(found.best, x=x)
+    found = times(cogging, factor, last=2)  # both waves
     assert held_out(found).gain < WORSE
     end, unseen = beyond_chance(found)
     assert end.steps
@@ -121,21 +135,18 @@ def test_a_law_whose_axis_stops_at_other_detents_is_refuted_only_if_short_window
     assert (unseen.ratio > KEPT_RATIO) == kept
 
 
+@pytest.fixture(scope="module")
+def friction(tmp_path_factory):
+    term = LoadFriction(coulomb_Nm=0.06)
+    return found_with(tmp_path_factory.mktemp("friction"), term, "load-friction/coulomb")
+
+
 @pytest.mark.parametrize(("factor", "better"), [(1.0, True), (-2.0, False), (5.0, False)])
 def test_a_law_predicts_better_if_errors_of_recordings_held_out_are_smaller(
-    tmp_path, factor, better
+    friction, factor, better
 ):
-    friction = LoadFriction(coulomb_Nm=0.06)
-    fitted = (axis_recording(friction, seed=seed) for seed in (3, 4))
-    held = axis_recording(friction, seed=5, role="validation")
-    found = begun(axis_case(tmp_path, *fitted, held, rig=axis_rig()), None, lambda text: None)
-    laws = [law for law in laws_of(found) if law.key == "load-friction/coulomb"]
-    add_all(found, laws, lambda text: None)
-    assert beyond_chance(found)[0].steps
-    x = found.best.x.copy()
-    x[-1] *= factor
-    found.best = replace(found.best, x=x)
-    assert predicts_better(found) is better
+    assert beyond_chance(friction)[0].steps
+    assert predicts_better(times(friction, factor, last=1)) is better
 
 
 OLD = np.array([4.0, 5.0, 6.0, 5.0])

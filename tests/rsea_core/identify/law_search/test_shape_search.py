@@ -1,6 +1,7 @@
 """A torque of unknown shape is seen where it acts, also in a narrow range of the angle."""
 
 import numpy as np
+import pytest
 
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Projection
@@ -15,12 +16,12 @@ ROW_s, ROWS, PARTS = 0.01, 2000, 10
 FRICTION_Nm, FRICTION_AT_rad, FRICTION_WIDTH_rad = 0.06, 0.4, 0.2
 
 
-def axis_with_local_friction(friction_Nm: float) -> Recording:
-    """An axis with friction in one range of its angle, in steps of 1 ms."""
+def axis_with_local_friction(friction_Nm: float, size: float = 1.0) -> Recording:
+    """An axis with friction in one range of its angle, in steps of 1 ms; size of the motion."""
     rig = axis_rig()
     inertia = rig.motor_inertia_kgm2 + rig.load_inertia_kgm2
     tau = ROW_s * np.arange(ROWS)
-    goal = 0.7 * np.sin(1.9 * tau) + 0.4 * np.sin(4.3 * tau + 1.0)
+    goal = size * (0.7 * np.sin(1.9 * tau) + 0.4 * np.sin(4.3 * tau + 1.0))
     current, angle = np.zeros(ROWS), np.zeros(ROWS)
     theta = omega = 0.0
     for row in range(ROWS):
@@ -42,13 +43,14 @@ def axis_with_local_friction(friction_Nm: float) -> Recording:
         "motor_angle_rad": np.floor(angle / count) * count,
     }  # fmt: skip
     return Recording(
-        file="local.csv", load=Load(kind="free"), columns=columns, sample_time_s=ROW_s,
+        file=f"local{size}.csv", load=Load(kind="free"), columns=columns, sample_time_s=ROW_s,
         initial_rest=True,
     )  # fmt: skip
 
 
-def best_shape(folder, friction_Nm: float):
-    case = axis_case(folder, axis_with_local_friction(friction_Nm), rig=axis_rig())
+def best_shape(folder, friction_Nm: float, sizes=(1.0,)):
+    recordings = [axis_with_local_friction(friction_Nm, size) for size in sizes]
+    case = axis_case(folder, *recordings, rig=axis_rig())
     estimator, base, _ = parameters(MultistepProblem(case), Hypothesis(), lambda text: None)
     return shapes(Projection(estimator, base))[0]
 
@@ -64,3 +66,11 @@ def test_friction_in_a_narrow_range_of_the_angle_is_a_shape_of_friction(tmp_path
 
 def test_an_axis_without_it_shows_no_shape(tmp_path):
     assert best_shape(tmp_path, 0.0).held_out < 20.0
+
+
+def test_a_shape_is_one_function_for_recordings_of_small_and_of_large_motion(tmp_path):
+    best = best_shape(tmp_path, FRICTION_Nm, (0.6, 2.0))
+    assert best.friction
+    assert best.signal == "wheel angle"
+    inside = np.abs(best.nodes - FRICTION_AT_rad) < 0.75 * FRICTION_WIDTH_rad
+    assert np.mean(best.values[inside]) == pytest.approx(FRICTION_Nm, rel=0.1)

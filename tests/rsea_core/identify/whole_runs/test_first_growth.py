@@ -8,7 +8,7 @@ import rsea_core.identify.investigate as investigate_module
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.search import begun
-from rsea_core.identify.whole_runs.complete import laws_added
+from rsea_core.identify.whole_runs.complete import laws_added, of_first_growth
 from rsea_core.recordings.case import Case
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -51,6 +51,23 @@ def test_windows_are_grown_again_where_laws_were_found_with_a_wrong_timing(
     monkeypatch.setattr(investigate_module, "in_better_timing", lambda growth, *_: growth)
     assert_friction(investigate(axis(tmp_path)))
     assert grown
+
+
+def test_complete_laws_in_doubt_stand_where_another_growth_finds_none(tmp_path, grown, monkeypatch):
+    ends = []
+
+    def doubted(*given):
+        ends.append(of_first_growth(*given)[0])
+        return ends[0], True
+
+    def incomplete(found, search, say):
+        return replace(found, complete=False, sound_below=0.0), None
+
+    monkeypatch.setattr(investigate_module, "of_first_growth", doubted)
+    monkeypatch.setattr(investigate_module, "concluded", incomplete)
+    assert_friction(investigate(axis(tmp_path)))
+    assert grown
+    assert ends[0].complete
 
 
 def test_a_search_is_continued_from_another_growth_that_ends_alike(tmp_path):

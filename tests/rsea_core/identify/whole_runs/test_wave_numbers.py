@@ -10,7 +10,6 @@ import pytest
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import fitted
-from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.screening import Projection, screen, screen_again
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.log_nuisances import nuisances
@@ -20,6 +19,7 @@ from rsea_core.identify.whole_runs.search import WholeSearch
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit
 from rsea_core.identify.whole_runs.taken_laws import Trial
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+from tests.cases.whole_runs import found_by_parameters
 
 AMPLITUDE_Nm, HARMONIC_Nm = 0.004, 0.002
 
@@ -36,8 +36,7 @@ def searched(tmp_path_factory):
     estimator, base, horizon = parameters_with_timing(
         case, Hypothesis(laws=nuisances(case)), lambda text: None
     )
-    found = Found(problem=estimator.problem, base_estimator=estimator, base=base,
-                  estimator=estimator, best=base, horizon=horizon)  # fmt: skip
+    found = found_by_parameters(estimator, base, horizon)
     own = in_sensor_noise(estimator)
     plain = own.fit(base.hypothesis, base.x, iterations=12)
     return WholeSearch(own, plain, found, laws_of(found), 1.6)
