@@ -41,7 +41,7 @@ from rsea_core.identify.whole_runs.nearly_complete import (
     nearly_complete,
 )
 from rsea_core.identify.whole_runs.parameters_alone import parameters_alone
-from rsea_core.identify.whole_runs.search import WholeSearch
+from rsea_core.identify.whole_runs.search import WholeSearch, begun_with_rival
 from rsea_core.identify.whole_runs.sensor_noise import (
     converged,
     excess,
@@ -105,7 +105,8 @@ def laws_added(found: Found, say, *, known: WholeSearch | None = None) -> tuple[
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
             return laws_added(other, say)
-    return found, search
+    rival = None if found.sound else begun_with_rival(search, say)
+    return found, rival or search
 
 
 def concluded(

@@ -25,8 +25,10 @@ from rsea_core.identify.law_search.pulses import pulse_ratio, pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen, screen_again
 from rsea_core.identify.multistep.criteria import (
     ALIKE_OF_GAIN,
+    CLOSE_FIRST,
     CLOSE_TO_BEST,
     EXPLAINED,
+    FIRST_RIVALS,
     LEAST_EXCESS,
     LEAST_OF_BEST,
     LEAST_OF_LEFT,
@@ -306,6 +308,29 @@ class WholeSearch(TakenLaws):
         return enough and (
             unseen_share(self.found, self.own, self.fit, self.plain, say) < UNPREDICTED
         )
+
+
+def begun_with_rival(search: WholeSearch, say) -> WholeSearch | None:
+    """A complete search that begins with a close rival of the first law; None if none is.
+
+    Alone, two laws can explain as much (a spring, an eccentric mass over a small angle), and
+    beside the wrong one no further law fits.
+    """
+    first = best_of_each_effect(search.first)
+    if search.left() <= search.enough or not search.taken or not first:
+        return None
+    others = [t for t in first[1:] if t.law.only is None]
+    for t in others[:FIRST_RIVALS]:
+        if t.gain < CLOSE_FIRST * first[0].gain:
+            break
+        say(f"  whole recordings: searched again from {t.law.key}, which alone gains as much")
+        other = type(search)(search.own, search.plain, search.found, search.laws, search.enough)
+        other.take(t, other.to_minimum(t), first, say)
+        other.first = search.first
+        other.add_all(say)
+        if other.left() <= other.enough:
+            return other
+    return None
 
 
 def _with_trials(known: Sequence[Trial], others: Sequence[Trial]) -> list[Trial]:
