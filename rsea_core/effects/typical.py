@@ -98,12 +98,12 @@ class TypicalMagnitudes:
         return self.like_angle(bench) * self._gear
 
     def motor_passes(self, cycles: float) -> bool:
-        """Whether the motor passes enough cycles of so many a turn to tell them from a bend."""
+        """Whether the motor turns far enough to tell cycles (in a turn) from a smooth curve."""
         travel = RANGE * self.angle_rad * self._ratio
         return not self.relative or cycles * travel > LEAST_CYCLES * 2.0 * np.pi
 
     def rows_show(self, cycles: float) -> bool:
-        """Whether two rows or more are in a cycle of so many in a turn, at the motor's speed."""
+        """Whether one of these cycles (in a turn) lasts two rows at the motor's rms speed."""
         return cycles * self.speed_rad_per_s * self._ratio * self.row_s < np.pi
 
     @property

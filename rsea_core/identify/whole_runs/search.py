@@ -124,10 +124,11 @@ class WholeSearch(TakenLaws):
         left = [w for w in self.laws if (w.effect, w.sensor) not in have]
         screened = screen(self.own, self.fit, left, wrong_signs=True)
         screened = screen_again(self.own, self.fit, screened)
+        projection = Projection(self.own, self.fit)
         if (LoadDisturbance.effect, None) not in have:
-            screened += pulses(Projection(self.own, self.fit))[:PULSES]
+            screened += pulses(projection)[:PULSES]
         candidates = most_promising(screened) + self.of_many_starts(left)
-        candidates += along_motion(Projection(self.own, self.fit), left)[:ORDERS]
+        candidates += along_motion(projection, left)[:ORDERS]
         candidates += of_other_effects(screened, candidates)
         quick = in_coarse_steps(self.own, self.fit, self.left())
         trials = self.fitted(self.fit, candidates, quick, iterations=QUICK_ITERATIONS)
@@ -313,8 +314,8 @@ class WholeSearch(TakenLaws):
 def begun_with_rival(search: WholeSearch, say) -> WholeSearch | None:
     """A complete search that begins with a close rival of the first law; None if none is.
 
-    Alone, two laws can explain as much (a spring, an eccentric mass over a small angle), and
-    beside the wrong one no further law fits.
+    Two laws can explain nearly the same alone (a spring and an eccentric mass over a small angle);
+    with the wrong one of the two, no further law fits.
     """
     first = best_of_each_effect(search.first)
     if search.left() <= search.enough or not search.taken or not first:
@@ -323,7 +324,9 @@ def begun_with_rival(search: WholeSearch, say) -> WholeSearch | None:
     for t in others[:FIRST_RIVALS]:
         if t.gain < CLOSE_FIRST * first[0].gain:
             break
-        say(f"  whole recordings: searched again from {t.law.key}, which alone gains as much")
+        say(
+            f"  whole recordings: searched again from {t.law.key}, which alone gains nearly as much"
+        )
         other = type(search)(search.own, search.plain, search.found, search.laws, search.enough)
         other.take(t, other.to_minimum(t), first, say)
         other.first = search.first

@@ -8,7 +8,7 @@ import pytest
 from rsea_core.effects.motor_cogging import MANY_CYCLES, MotorCogging
 from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.law_search.screening import Projection
+from rsea_core.identify.law_search.screening import Projection, screen, screen_again
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.timing_choice import parameters_with_timing
@@ -32,12 +32,14 @@ def test_the_numbers_tried_are_those_of_motors(motor, cycles):
 
 def test_a_number_is_tried_only_where_two_rows_are_in_a_cycle(tmp_path):
     typical = own_magnitudes(axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig()))
-    for share in (0.5, 0.1, 0.02):
-        row_s = share * typical.row_s
+    largest = []
+    for rows_in_cycle in (1.9, 2.1):  # of 100 cycles in a turn
+        row_s = 2.0 * np.pi / (100 * typical.speed_rad_per_s) / rows_in_cycle
         laws = MotorCogging.candidates(replace(typical, row_s=row_s))
         tried = {law.starts[0][2] for law in laws} & set(MANY_CYCLES)
-        shown = {c for c in MANY_CYCLES if c * typical.speed_rad_per_s * row_s < np.pi}
-        assert tried == shown
+        assert tried == {c for c in MANY_CYCLES if c <= max(tried)}
+        largest.append(max(tried))
+    assert largest == [90, 100]
 
 
 def test_cogging_of_twelve_slots_and_fourteen_poles_is_found_along_the_recorded_motion(tmp_path):
@@ -52,6 +54,9 @@ def test_cogging_of_twelve_slots_and_fourteen_poles_is_found_along_the_recorded_
     plain = own.fit(base.hypothesis, base.x, iterations=12)
     found = found_by_parameters(estimator, base)
     search = WholeSearch(own, plain, found, laws_of(found), 1.6)
+    engine = [w for w in search.laws if w.effect == MotorCogging.effect and len(w.unknowns) == 3]
+    screened = screen(own, plain, [replace(w, follows=False) for w in engine])
+    assert screen_again(own, plain, screened)[0].law.key != "motor-cogging/84 per turn"
     first = along_motion(Projection(own, plain), search.laws)[0]
     assert first.law.key == "motor-cogging/84 per turn"
     sine, cosine, _cycles = first.start
