@@ -240,7 +240,8 @@ class SpringHysteresis(Hysteresis):
             return (*found, *at_begin)
 
         common = {"effect": cls.effect, "subsystem": "spring", "write": _write_slips, "kind": cls,
-                  "parameters": _slip_parameters}  # fmt: skip
+                  "parameters": _slip_parameters,
+                  "own_form_spread": typical.spread_of_loop(LOOP_AT_rad)}  # fmt: skip
         return (
             Law(law="one slip", unknowns=(*flat[:2], *begun),
                 starts=(start((0.1,), 0.05 * K), start((0.5,), 0.1 * K), start((1.5,), 0.1 * K)),
@@ -389,6 +390,7 @@ class SpringBoucWen(Hysteresis):
         return (
             Law(effect=cls.effect, law="bouc-wen", subsystem="spring", write=_write_bouc_wen,
                 richer=("four slips", "six slips"), unknowns=(*unknowns, *begun), kind=cls,
+                own_form_spread=typical.spread_of_loop(LOOP_AT_rad),
                 parameters=lambda v, rig: {k: x for k, x in v.items() if k != "start_relaxed"},
                 starts=tuple((*start, *at_begin) for start in starts)),
         )  # fmt: skip

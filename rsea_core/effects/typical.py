@@ -12,6 +12,7 @@ BENCH_SPEED_rad_per_s, BENCH_ANGLE_rad, BENCH_TIME_s, BENCH_RATIO = 2.0, 0.5, 0.
 
 RANGE = 3.0  # of a motion, in standard deviations
 LEAST_CYCLES = 1.5
+KNOWN_TO = 2.0  # recorded amplitudes: a spring's loop is known up to here by its law
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,6 +72,21 @@ class TypicalMagnitudes:
     begins_deflected: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     row_s: float = 0.0
+
+    def spread_of_loop(self, amplitude_rad: float) -> float | None:
+        """Relative error (rms) of the loop of a spring at an amplitude far beyond those recorded.
+
+        Laws that agree on what was recorded differ beyond: where all elements have slipped, the
+        width stays; where further ones slip, it grows in proportion to the amplitude at most. Its
+        growth is taken as r^u, u uniform from 0 to 1; this is the root mean square of r^u - 1.
+        None for a bench, whose recordings reach the amplitude, and up to `KNOWN_TO`.
+        """
+        reach = KNOWN_TO * 0.5 * RANGE * self.deflection_rad
+        if not self.relative or reach >= amplitude_rad:
+            return None
+        r, log_r = amplitude_rad / reach, np.log(amplitude_rad / reach)
+        square = (r**2 - 1.0) / (2.0 * log_r) - 2.0 * (r - 1.0) / log_r + 1.0
+        return float(np.sqrt(max(square, 0.0)))
 
     def like_inertia(self, bench: float) -> float:
         """An inertia at the output [kg m2], as `like_speed`: its torque in the motion for one."""

@@ -139,7 +139,7 @@ def _drive_into(plant: mp.Plant, A: NDArray, b: NDArray, torque: NDArray) -> flo
 
 def fastest_mode_per_s(plant: mp.Plant, spring: SpringTable) -> float:
     """Largest pole magnitude [rad/s] over the spring's tangents, in and out of contact."""
-    tangents = spring.regions[:, C1].min(), spring.regions[:, C1].max()
+    tangents = {float(spring.regions[:, C1].min()), float(spring.regions[:, C1].max())}
     contacts = (False, True) if np.isfinite(plant.contact_angle) else (False,)
     fastest = 0.0
     for tangent in tangents:

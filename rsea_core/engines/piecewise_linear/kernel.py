@@ -229,8 +229,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     """Run the sampled loop; `log` (N_LOG + behind, n) is filled. Returns (status, last row)."""
     plant, fx, y, time = machine.plant, machine.fx, work.y, rows.time
     n, row_s, until_sample = time.size, rows.row_s, 0
-    signals, acts = np.zeros(k.N_SIGNALS), np.array([-1.0, 0.0, 0.0])
-    commands = np.zeros((3, k.N_COMMANDS))
+    signals, acts, commands = work.signals, work.acts, work.commands
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
     remembers, delayed = fx[e.INTERNAL_STATES] != 0.0, fx[e.COMMAND_DELAY] > 0.0
     fixed, mode, region, now = _first(machine, rows, y)
@@ -286,34 +285,6 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     return pe.DONE, n - 1
 
 
-@njit(error_model="numpy", inline="always")
-def _borrowed(machine, modes, work, rows):
-    """The same without owners: `run`'s caller keeps the memory, see `unowned`."""
-    return (
-        pm.Machine(
-            machine.plant, unowned(machine.spring), unowned(machine.fx),
-            unowned(machine.states), unowned(machine.event_kinds),
-        ),
-        pm.Modes(
-            modes.row_s, unowned(modes.keys), unowned(modes.levels), unowned(modes.systems),
-            unowned(modes.steps),
-        ),
-        pm.Work(
-            unowned(work.y), unowned(work.middle), unowned(work.trial), unowned(work.values),
-            unowned(work.force), unowned(work.moved), unowned(work.series),
-            unowned(work.gravity_sines), unowned(work.times), unowned(work.fastest),
-            unowned(work.derivatives),
-        ),
-        Rows(
-            rows.start_s, rows.row_s, rows.rows_per_sample, rows.delay_samples,
-            rows.command_limit, rows.motor_noise_rad, rows.load_noise_rad, rows.current_noise_A,
-            rows.seed, rows.wheel_start_rad, rows.load_start_rad, unowned(rows.time),
-            unowned(rows.reference), unowned(rows.angle), unowned(rows.speed),
-            unowned(rows.timed), unowned(rows.behind), rows.sensors,
-        ),
-    )  # fmt: skip
-
-
 def _cached(version):
     def run(machine, modes, work, rows, controller, parameters, state, log):
         if rows.seed >= 0:
@@ -321,9 +292,15 @@ def _cached(version):
         work.y[:] = 0.0
         work.times[:] = 0.0
         work.fastest[0] = 0.0
+        work.signals[:] = 0.0
+        work.commands[:] = 0.0
+        work.acts[:] = 0.0
+        work.acts[0] = -1.0
         work.y[k.TW], work.y[k.TL] = rows.wheel_start_rad, rows.load_start_rad
-        machine, modes, work, rows = _borrowed(machine, modes, work, rows)
-        return loop(machine, modes, work, rows, controller, parameters, state, unowned(log))
+        return loop(  # the caller keeps the memory
+            unowned(machine), unowned(modes), unowned(work), unowned(rows), controller,
+            unowned(parameters), unowned(state), unowned(log),
+        )  # fmt: skip
 
     return njit(cache=True, nogil=True, error_model="numpy")(run)
 

@@ -82,6 +82,9 @@ class Work(NamedTuple):
     times: NDArray  # (4,) at the current limit, in contact, wheel and load held [s]
     fastest: NDArray  # (1,) largest speed of the load so far [rad/s]
     derivatives: NDArray  # (1, N_DERIVATIVES)
+    signals: NDArray  # (N_SIGNALS,) what a controller reads
+    acts: NDArray  # (3,) the last row whose command acts (-1 none), that command, the present row
+    commands: NDArray  # (3, N_COMMANDS) a controller's answer, the waiting and the acting one
 
 
 def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
@@ -93,7 +96,8 @@ def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
     modes = Modes(row_s, keys, levels, systems, steps)
     states = (np.zeros(k.N_Y) for _ in range(3))
     shapes = ((3, machine.event_kinds.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
-    work = Work(*states, *map(np.zeros, (*shapes, (1, k.N_DERIVATIVES))))
+    shapes = (*shapes, (1, k.N_DERIVATIVES), k.N_SIGNALS, 3, (3, k.N_COMMANDS))
+    work = Work(*states, *map(np.zeros, shapes))
     return modes, work
 
 

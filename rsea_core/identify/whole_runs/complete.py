@@ -138,8 +138,8 @@ def of_first_growth(found: Found, search: WholeSearch, say) -> tuple[Found | Non
     Found or None
         None if laws are not complete.
     bool
-        Whether it is in doubt: values are far from the rig file's (a growth may end at wrong ones),
-        or the recordings are likelier with commands at other times.
+        Whether it is in doubt: the recordings are likelier with commands at other times, or values
+        are far from the rig file's without a law (those of laws were also fitted from there).
     """
     if not search.left() <= search.enough:
         return None, True
@@ -149,7 +149,7 @@ def of_first_growth(found: Found, search: WholeSearch, say) -> tuple[Found | Non
             return None, True
         found = end[0]
     own, fit, case = search.own, search.fit, search.own.problem.case
-    if far_from_rig(own.problem, fit.x):
+    if found.needs_no_law and far_from_rig(own.problem, fit.x):
         return found, True
     for timing in timings(case, own.problem.timing):
         if _with_timing(own, timing, fit.hypothesis, fit.x).cost < fit.cost - search.doubt():
