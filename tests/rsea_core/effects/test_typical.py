@@ -18,27 +18,27 @@ def case(tmp_path_factory):
     return axis_case(tmp_path_factory.mktemp("axis"), axis_recording(seed=1), rig=axis_rig())
 
 
-def bent(case, amplitude_rad: float, relative: bool = True):
+def deflected(case, amplitude_rad: float, relative: bool = True):
     deflection = amplitude_rad / (0.5 * RANGE)
     return replace(own_magnitudes(case), deflection_rad=deflection, relative=relative)
 
 
 def test_a_loop_far_beyond_the_recorded_amplitude_may_grow_in_proportion_to_it(case):
-    typical = bent(case, LOOP_AT_rad / KNOWN_TO / RATIO)
+    typical = deflected(case, LOOP_AT_rad / KNOWN_TO / RATIO)
     u = (np.arange(100_000) + 0.5) / 100_000
     expected = np.sqrt(np.mean((RATIO**u - 1.0) ** 2))
     assert typical.spread_of_loop(LOOP_AT_rad) == pytest.approx(expected, rel=1e-6)
 
 
 def test_a_loop_near_the_recorded_amplitude_has_no_error_of_extrapolation(case):
-    assert bent(case, 1.01 * LOOP_AT_rad / KNOWN_TO).spread_of_loop(LOOP_AT_rad) is None
-    beyond = bent(case, 0.99 * LOOP_AT_rad / KNOWN_TO).spread_of_loop(LOOP_AT_rad)
+    assert deflected(case, 1.01 * LOOP_AT_rad / KNOWN_TO).spread_of_loop(LOOP_AT_rad) is None
+    beyond = deflected(case, 0.99 * LOOP_AT_rad / KNOWN_TO).spread_of_loop(LOOP_AT_rad)
     assert 0.0 < beyond < 0.02
-    assert bent(case, 1e-4, relative=False).spread_of_loop(LOOP_AT_rad) is None
+    assert deflected(case, 1e-4, relative=False).spread_of_loop(LOOP_AT_rad) is None
 
 
 @pytest.mark.parametrize("kind", [SpringHysteresis, SpringBoucWen])
 def test_every_law_of_a_loop_states_it(case, kind):
-    typical = bent(case, LOOP_AT_rad / KNOWN_TO / RATIO)
+    typical = deflected(case, LOOP_AT_rad / KNOWN_TO / RATIO)
     spreads = {law.form_spread for law in kind.candidates(typical)}
     assert spreads == {typical.spread_of_loop(LOOP_AT_rad)}
