@@ -2,6 +2,7 @@
 
 import importlib.util
 import signal
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,16 @@ def _listed(file: Path) -> list[str]:
     return [line.split(maxsplit=1)[1] for line in lines if line and not line.startswith("#")]
 
 
+def _seconds_of_files() -> Counter[str]:
+    """CPU seconds of each file's slow tests."""
+    found: Counter[str] = Counter()
+    for line in SLOW_TESTS.read_text(encoding="utf-8").splitlines():
+        if line and not line.startswith("#"):
+            seconds, test = line.split(maxsplit=1)
+            found[test.partition("::")[0]] += float(seconds)
+    return found
+
+
 def missing_cad_kernel() -> str:
     """Why the CAD kernel cannot be imported; empty where it can."""
     if importlib.util.find_spec("cadquery") is None:
@@ -79,6 +90,9 @@ def _asked_for(items: list[pytest.Item], config: pytest.Config) -> list[pytest.I
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     asked_for = _asked_for(items, config)
     config.hook.pytest_deselected(items=[i for i in items if i not in set(asked_for)])
+    # the longest files first: at the end both processes then have short ones left
+    seconds = _seconds_of_files()
+    asked_for.sort(key=lambda item: -seconds[item.nodeid.partition("::")[0]])
     items[:] = asked_for
     slow = set(slow_tests())
     without_cad = missing_cad_kernel()

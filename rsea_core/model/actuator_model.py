@@ -236,7 +236,8 @@ class ActuatorModel:
         rig.need(f"a simulation driven by {command_name}", *NEEDED_BY_DRIVE[command_name])
         if rig.has("gear") and command_name != POSITION_COMMAND:
             rig.need("the wheel's motion", "motor_inertia_kgm2")
-        if rig.has("load") and not load.is_held:
+        alone = self.structure(load) != mp.RIGID_FREE or not self._at_output("inertia_kgm2")
+        if rig.has("load") and not load.is_held and alone:
             rig.need(f'the load "{load.kind}"', "load_inertia_kgm2")
         if rig.has("load") and _feels_gravity(self.rig, load):
             rig.need(f'gravity on the load "{load.kind}"', "load_mass_kg", "load_distance_m")

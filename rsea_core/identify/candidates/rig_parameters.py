@@ -11,6 +11,7 @@ import numpy as np
 
 from rsea_core.effects.variant import PLANT, TrialMachine
 from rsea_core.machine.inputs import POSITION_COMMAND
+from rsea_core.machine.plant import RIGID_FREE
 from rsea_core.machine.rig import Rig
 from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
@@ -40,6 +41,7 @@ ONE_BODY = (  # before and behind the gear: only their sum is seen
 PARTNER = {own: other for pair in ONE_BODY for own, other in (pair, pair[::-1])}
 DAMPINGS = (*ONE_BODY[1], "load_viscous_Nms_per_rad")
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
+UNKNOWN_INERTIA = 1.0  # of the logarithm: a rigid train's inertia whose load the file leaves out
 UNKNOWN = 5.0  # times as much where the file leaves the damping out
 
 
@@ -102,6 +104,8 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             tolerance = float(np.hypot(tolerance, stated.get("load_distance_m", 0.0)))
         if tolerance == 0.0:
             continue
+        if key in ONE_BODY[0] and _leaves_inertia_out(rig):
+            tolerance = float(np.hypot(tolerance, UNKNOWN_INERTIA))
         if key == "load_viscous_Nms_per_rad" and value:
             tolerance = float(np.hypot(tolerance, np.log1p(_unstated_damping_std(rig) / value)))
         if key in ANGLES:
@@ -136,6 +140,11 @@ def _damping_left_out(rig: Rig, keys: list) -> list[str]:
         damping for inertia, damping in bodies
         if getattr(rig, inertia) and getattr(rig, damping) is None and damping not in keys
     ] if rig.has("spring") else []  # fmt: skip
+
+
+def _leaves_inertia_out(rig: Rig) -> bool:
+    """Whether the file does not state the load's inertia of a rigid train: unknown, not none."""
+    return rig.has("load") and not rig.has("spring") and not rig.load_inertia_kgm2
 
 
 def _unstated_damping_std(rig: Rig) -> float:
@@ -250,7 +259,7 @@ def write_nominal(
         elif key == "output_viscous_Nms_per_rad":
             plant[PLANT["damping"]] = max(plant[PLANT["damping"]] + change, 0.0)
         elif key == "load_viscous_Nms_per_rad":
-            if plant[PLANT["load_inertia"]] > 0.0:
+            if plant[PLANT["load_inertia"]] > 0.0 or plant[PLANT["structure"]] == RIGID_FREE:
                 plant[PLANT["load_damping"]] = max(value, 0.0)
         else:
             plant[PLANT[FIELD[key]]] *= value / base[key]

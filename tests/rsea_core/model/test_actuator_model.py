@@ -247,6 +247,15 @@ def test_machine_that_lacks_something_says_what(changes, inputs, error, message)
     assert "\n" not in str(caught.value)
 
 
+def test_a_rigid_train_without_stated_load_inertia_turns_with_the_motors_alone():
+    """w = tau t/J, from a held motor torque."""
+    rig = Rig(name="axis", parts=("drive", "gear", "load"), motor_inertia_kgm2=2e-4, gear_ratio=5.0)
+    torque = np.full(SECONDS.size, 0.01)
+    given = Inputs(time_s=SECONDS, motor_torque_Nm=torque, load=Load(kind="free"))
+    speed = simulate(ActuatorModel(rig), given).motor_velocity_rad_per_s
+    assert speed == pytest.approx(0.01 / 2e-4 * SECONDS, rel=1e-9)
+
+
 def test_values_that_a_load_does_not_need_may_be_missing():
     rig = replace(BENCH, load_mass_kg=None, load_inertia_kgm2=None, current_limit_A=None)
     result = simulate(

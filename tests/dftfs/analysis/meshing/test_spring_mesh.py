@@ -48,20 +48,24 @@ def outline(request):
     return build_outline(request.param)
 
 
+@pytest.fixture(scope="module")
+def sector(outline):
+    return sector_mesh(outline)
+
+
 def area(mesh):
     return float(np.sum(jacobian_determinants(mesh) @ GAUSS_3X3))
 
 
-def test_mesh_area_is_the_outlines(outline):
+def test_mesh_area_is_the_outlines(outline, sector):
     """Quadratic edges through exact points: the area is off by the fourth power of the size."""
-    sector = sector_mesh(outline)
     n_arms = outline.parameters.n_arms
     assert n_arms * area(sector) == pytest.approx(outline.area_m2, rel=2e-5)
     assert area(full_mesh(sector, n_arms)) == pytest.approx(outline.area_m2, rel=2e-5)
 
 
-def test_every_boundary_node_lies_on_its_exact_edge(outline):
-    sector, p = sector_mesh(outline), outline.parameters
+def test_every_boundary_node_lies_on_its_exact_edge(outline, sector):
+    p = outline.parameters
     for name, radius in (
         ("bore", p.bore_radius_m),
         ("rim_outer", p.rim_outer_radius_m),
@@ -76,8 +80,7 @@ def test_every_boundary_node_lies_on_its_exact_edge(outline):
         assert np.min(np.hypot(*(edge - node).T)) < 4e-6  # half a sample of the comparison curve
 
 
-def test_elements_are_usable(outline):
-    sector = sector_mesh(outline)
+def test_elements_are_usable(sector):
     quality = corner_quality(sector.nodes[sector.cells[:, :4]])
     assert quality.min() > 0.1
     assert np.percentile(quality, 5) > 0.6

@@ -85,3 +85,13 @@ def test_a_weight_is_as_uncertain_as_mass_and_distance_together(
     recording = replace(axis_recording(seed=1), load=Load(kind="pendulum"))
     found = {p.key: p.tolerance for p in nominals(axis_case(tmp_path, recording, rig=rig))}
     assert found.get("load_mass_kg") == (None if expected is None else pytest.approx(expected))
+
+
+def inertia_tolerance(case, **values):
+    rig = replace(axis_rig(), **values)
+    return {p.key: p.tolerance for p in nominals(replace(case, rig=rig))}["motor_inertia_kgm2"]
+
+
+def test_unstated_inertia_of_a_rigid_trains_load_widens_the_prior_of_the_motors(case):
+    assert inertia_tolerance(case) == TOLERANCES["motor_inertia_kgm2"]
+    assert inertia_tolerance(case, load_inertia_kgm2=None) > 1.0
