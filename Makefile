@@ -56,7 +56,7 @@ lint: $(VENV)/.test
 
 # a worker that crashes ends the run; one that is lost without a word is tests/worker_watch.py's
 # (one thread of BLAS each: two processes with two threads each wait for one another)
-TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --max-worker-restart=0
+TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --max-worker-restart=0
 
 test: lint
 	@echo "[test] running the tests on $(JOBS) processes"
