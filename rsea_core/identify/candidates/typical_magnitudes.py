@@ -125,12 +125,15 @@ def _servo_torque(rig, r, ratio: float) -> float:
 
 
 def _deflection(r, ratio: float) -> float:
-    """Standard deviation of the spring's deflection [rad], where both its ends are read."""
+    """Standard deviation of the spring's deflection [rad], where both its ends are known."""
     if "spring_deflection_rad" in r:
         return float(np.std(r["spring_deflection_rad"]))
-    if "motor_angle_rad" in r and "load_angle_rad" in r:
+    if "motor_angle_rad" not in r:
+        return 0.0
+    if "load_angle_rad" in r:
         return float(np.std(r["motor_angle_rad"] / ratio - r["load_angle_rad"]))
-    return 0.0
+    # a locked end: at resonance the spring deflects by many times torque over stiffness
+    return float(np.std(r["motor_angle_rad"])) / ratio if r.load.kind == "locked" else 0.0
 
 
 def _bench_magnitudes(case: Case) -> TypicalMagnitudes:

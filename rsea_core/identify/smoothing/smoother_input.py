@@ -106,7 +106,7 @@ class Recorded:
         plant, command = self.machine.plant, self.commanded()
         if plant.drive == mp.CURRENT:
             limited = np.abs(command) > plant.current_limit
-            current = np.where(limited, np.sign(command) * plant.current_limit, 0.0)
+            current = np.where(limited, np.copysign(plant.current_limit, command), 0.0)
             return pinned | limited, np.where(pinned, 0.0, current)
         if not self._may_be_limited():
             return pinned, current

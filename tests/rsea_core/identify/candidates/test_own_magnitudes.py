@@ -51,6 +51,18 @@ def test_typical_speed_does_not_come_from_the_steps_of_a_coarse_encoder(tmp_path
     assert 0.2 < fine.time_s < 0.6  # of three sines of 0.31, 0.83 and 1.9 Hz
 
 
+def test_a_spring_with_a_locked_end_deflects_as_the_motor_turns(tmp_path):
+    """At resonance by many times torque over stiffness."""
+    rig = Rig(name="oscillator", parts=("drive", "gear", "spring"), torque_constant_Nm_per_A=1.0,
+              motor_inertia_kgm2=1e-5, gear_ratio=4.0, spring_stiffness_Nm_per_rad=1.0)  # fmt: skip
+    time = 1e-2 * np.arange(500)
+    columns = {"time_s": time, "current_command_A": 1e-4 * np.sin(time),
+               "motor_angle_rad": 0.4 * np.sin(time)}  # fmt: skip
+    r = Recording(file="sine.csv", load=Load(kind="locked"), columns=columns, sample_time_s=1e-2)
+    found = own_magnitudes(axis_case(tmp_path, r, rig=rig))
+    assert found.deflection_rad == pytest.approx(np.std(0.1 * np.sin(time)))
+
+
 def test_the_peak_current_of_a_voltage_is_what_back_emf_leaves_of_it(tmp_path):
     rig = Rig(name="motor", parts=("drive", "load"), terminal_resistance_ohm=2.0,
               torque_constant_Nm_per_A=0.5, back_emf_constant_Vs_per_rad=0.5, current_limit_A=50.0,
