@@ -234,10 +234,13 @@ class ActuatorModel:
         if not rig.has("load") and load.kind not in ("locked", "imposed", "free"):
             raise InputError(f'rig {rig.name!r} has no load: "{load.kind}" is not possible on it')
         rig.need(f"a simulation driven by {command_name}", *NEEDED_BY_DRIVE[command_name])
-        if rig.has("gear") and command_name != POSITION_COMMAND:
+        elastic = self.structure(load) in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
+        turns = self._at_output("inertia_kgm2") > 0.0  # as one body with the load, if rigid
+        moves = rig.has("load") and not load.is_held
+        stated = moves and rig.load_inertia_kgm2
+        if rig.has("gear") and command_name != POSITION_COMMAND and (elastic or not stated):
             rig.need("the wheel's motion", "motor_inertia_kgm2")
-        alone = self.structure(load) != mp.RIGID_FREE or not self._at_output("inertia_kgm2")
-        if rig.has("load") and not load.is_held and alone:
+        if moves and (elastic or not turns):
             rig.need(f'the load "{load.kind}"', "load_inertia_kgm2")
         if rig.has("load") and _feels_gravity(self.rig, load):
             rig.need(f'gravity on the load "{load.kind}"', "load_mass_kg", "load_distance_m")

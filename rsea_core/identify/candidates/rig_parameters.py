@@ -41,7 +41,7 @@ ONE_BODY = (  # before and behind the gear: only their sum is seen
 PARTNER = {own: other for pair in ONE_BODY for own, other in (pair, pair[::-1])}
 DAMPINGS = (*ONE_BODY[1], "load_viscous_Nms_per_rad")
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
-UNKNOWN_INERTIA = 1.0  # of the logarithm: a rigid train's inertia whose load the file leaves out
+UNKNOWN_INERTIA = 1.0  # of the logarithm: a rigid train's inertia of which a part is left out
 UNKNOWN = 5.0  # times as much where the file leaves the damping out
 
 
@@ -104,7 +104,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             tolerance = float(np.hypot(tolerance, stated.get("load_distance_m", 0.0)))
         if tolerance == 0.0:
             continue
-        if key in ONE_BODY[0] and _leaves_inertia_out(rig):
+        if _inertia_left_out_beside(key, rig):
             tolerance = float(np.hypot(tolerance, UNKNOWN_INERTIA))
         if key == "load_viscous_Nms_per_rad" and value:
             tolerance = float(np.hypot(tolerance, np.log1p(_unstated_damping_std(rig) / value)))
@@ -142,9 +142,13 @@ def _damping_left_out(rig: Rig, keys: list) -> list[str]:
     ] if rig.has("spring") else []  # fmt: skip
 
 
-def _leaves_inertia_out(rig: Rig) -> bool:
-    """Whether the file does not state the load's inertia of a rigid train: unknown, not none."""
-    return rig.has("load") and not rig.has("spring") and not rig.load_inertia_kgm2
+def _inertia_left_out_beside(key: str, rig: Rig) -> bool:
+    """Whether a value is an inertia of a rigid train of which the file leaves another one out."""
+    if not rig.has("gear") or not rig.has("load") or rig.has("spring"):
+        return False
+    if key in ONE_BODY[0]:
+        return not rig.load_inertia_kgm2
+    return key == "load_inertia_kgm2" and not any(getattr(rig, k) for k in ONE_BODY[0])
 
 
 def _unstated_damping_std(rig: Rig) -> float:

@@ -25,6 +25,7 @@ load_inertia_kgm2 = 0.03
 motor_encoder_counts_per_rev = 8192
 torque_sensor_noise_Nm = 0.02
 """
+CONSTANTS = ("torque_constant_Nm_per_A", "back_emf_constant_Vs_per_rad")
 ROWS = 40
 
 
@@ -69,13 +70,21 @@ def test_a_case_is_read_with_roles_loads_and_responses(tmp_path):
 
 
 def test_only_a_machine_driven_by_current_or_voltage_needs_its_torque_constant(tmp_path):
-    without = RIG.replace("torque_constant_Nm_per_A = 0.3056\n", "")
+    without = RIG
+    for constant in CONSTANTS:
+        without = without.replace(f"{constant} = 0.3056\n", "")
     with pytest.raises(RseaError, match=r"a\.csv.* duty.* needs torque_constant_Nm_per_A"):
         read_case(case(tmp_path, without))
     torque = np.sin(np.arange(ROWS))
     found = read_case(case(tmp_path, without, duty=None, motor_torque_Nm=torque))
     assert found.rig.torque_constant_Nm_per_A is None
     assert found.recordings[0].command_name == "motor_torque_Nm"
+
+
+@pytest.mark.parametrize("left_out", CONSTANTS)
+def test_of_torque_and_back_emf_constant_one_is_enough_for_a_winding(tmp_path, left_out):
+    found = read_case(case(tmp_path, RIG.replace(f"{left_out} = 0.3056\n", ""))).rig
+    assert [getattr(found, constant) for constant in CONSTANTS] == [0.3056, 0.3056]
 
 
 def test_the_noise_floor_is_the_count_or_the_stated_noise(tmp_path):

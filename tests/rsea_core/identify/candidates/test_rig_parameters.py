@@ -87,11 +87,15 @@ def test_a_weight_is_as_uncertain_as_mass_and_distance_together(
     assert found.get("load_mass_kg") == (None if expected is None else pytest.approx(expected))
 
 
-def inertia_tolerance(case, **values):
+def tolerance(case, key, **values):
     rig = replace(axis_rig(), **values)
-    return {p.key: p.tolerance for p in nominals(replace(case, rig=rig))}["motor_inertia_kgm2"]
+    return {p.key: p.tolerance for p in nominals(replace(case, rig=rig))}[key]
 
 
-def test_unstated_inertia_of_a_rigid_trains_load_widens_the_prior_of_the_motors(case):
-    assert inertia_tolerance(case) == TOLERANCES["motor_inertia_kgm2"]
-    assert inertia_tolerance(case, load_inertia_kgm2=None) > 1.0
+@pytest.mark.parametrize(
+    ("key", "absent"),
+    [("motor_inertia_kgm2", "load_inertia_kgm2"), ("load_inertia_kgm2", "motor_inertia_kgm2")],
+)
+def test_an_unstated_inertia_of_a_rigid_train_widens_the_prior_of_the_other(case, key, absent):
+    assert tolerance(case, key) == TOLERANCES[key]
+    assert tolerance(case, key, **{absent: None}) > 1.0
