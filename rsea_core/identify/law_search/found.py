@@ -85,6 +85,8 @@ class Found:
         (`whole_runs`); inf: not known.
     excess : float
         Cost of these errors above that of the noise, in units.
+    explained_once : float
+        Share of that cost which a torque that acts once explains, if no law explains more.
     sound_below : float
         Misfit, in these deviations, below which parameters alone are sufficient.
     by_whole_runs : Found or None
@@ -114,6 +116,7 @@ class Found:
     screened: list[Candidate] = field(default_factory=list)
     left_by_parameters: float = np.inf
     excess: float = 0.0
+    explained_once: float = 0.0
     sound_below: float = SOUND
     by_whole_runs: "Found | None" = None
     complete: bool = False

@@ -123,6 +123,7 @@ def concluded(
             return finished
     if found.sound:  # an error that small is not evidence of a law that explains a part of it
         return found, None
+    found = replace(found, explained_once=search.explained_once())
     nearly = nearly_complete(found, search, say)
     other = _with_other_timing(search, say) if again and search.taken else None
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
@@ -373,7 +374,7 @@ def _with_shape(found: Found, own: Estimator, say) -> Found:
         return found
     share = best.held_out / had
     say(f"whole recordings: {best.sentence()}, explains {share:.2f} of the excess")
-    if share < SHAPE_SHARE:
+    if share < max(SHAPE_SHARE, found.explained_once):  # less than an error of one time
         return found
     return replace(found, base_shapes=[best, *found.base_shapes])
 

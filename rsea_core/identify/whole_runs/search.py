@@ -191,6 +191,12 @@ class WholeSearch(TakenLaws):
                 return
             self.prune(say)
 
+    def explained_once(self) -> float:
+        """Share of what parameters leave that the first law explains, if it acts once; else 0."""
+        first = self.first[0] if self.first else None
+        once = first is not None and first.law.effect == LoadDisturbance.effect
+        return first.gain / max(self.found.excess, 1.0) if once else 0.0
+
     def begun_at_bound(self, say) -> "WholeSearch | None":
         """A search that begins with a law that fitted best alone, but at a bound.
 
