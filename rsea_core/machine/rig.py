@@ -8,7 +8,7 @@ spring and load side are named in words, and an unknown key is an error.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from importlib import resources
 from pathlib import Path
 
@@ -132,6 +132,18 @@ class Rig:
     def has(self, part: str) -> bool:
         """Whether the machine has this part ("drive", "gear", "spring" or "load")."""
         return part in self.parts
+
+    def with_both_constants(self) -> "Rig":
+        """Torque constant and back-EMF constant are one number in SI units: one is enough.
+
+        A rig without a winding's resistance, whose current is given, needs the first one alone.
+        """
+        k_t, k_e = self.torque_constant_Nm_per_A, self.back_emf_constant_Vs_per_rad
+        if k_t is None and k_e is not None:
+            return replace(self, torque_constant_Nm_per_A=k_e)
+        if k_e is None and k_t is not None and self.terminal_resistance_ohm is not None:
+            return replace(self, back_emf_constant_Vs_per_rad=k_t)
+        return self
 
     def full_command(self, name: str | None) -> float:
         """Largest command of a drive in the command's own unit; 1 where no value states it."""

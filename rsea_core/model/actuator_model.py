@@ -288,7 +288,7 @@ class ActuatorModel:
         for term in self.terms:
             if self._acts(term, load):
                 plant = term.on_plant(plant)
-        self._require_inertia(plant)
+        _require_inertia(rig, plant)
         return plant
 
     def describe(self, command_name: str | None = "duty", load: Load = Load()) -> str:  # noqa: B008
@@ -312,21 +312,22 @@ class ActuatorModel:
             getattr(rig, f"output_{quantity}") or 0.0
         )
 
-    def _require_inertia(self, plant: mp.Plant) -> None:
-        elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
-        if elastic and not self.rig.has("gear"):
-            raise RigError(
-                f"rig {self.rig.name!r}: nothing moves without a gear: evaluate the spring's"
-                " curve instead of simulating"
-            )
-        inertia = plant.inertia
-        if plant.structure == mp.RIGID_FREE:
-            inertia += plant.load_inertia
-        if plant.structure != mp.RIGID_HELD and not inertia > 0.0:
-            raise RigError(
-                f"rig {self.rig.name!r}: the moving inertia is zero; give motor_inertia_kgm2,"
-                " output_inertia_kgm2 or load_inertia_kgm2"
-            )
+
+def _require_inertia(rig: Rig, plant: mp.Plant) -> None:
+    elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
+    if elastic and not rig.has("gear"):
+        raise RigError(
+            f"rig {rig.name!r}: nothing moves without a gear: evaluate the spring's"
+            " curve instead of simulating"
+        )
+    inertia = plant.inertia
+    if plant.structure == mp.RIGID_FREE:
+        inertia += plant.load_inertia
+    if plant.structure != mp.RIGID_HELD and not inertia > 0.0:
+        raise RigError(
+            f"rig {rig.name!r}: the moving inertia is zero; give motor_inertia_kgm2,"
+            " output_inertia_kgm2 or load_inertia_kgm2"
+        )
 
 
 def _numbers_of_servo(rig: Rig, command_name: str | None) -> NDArray:

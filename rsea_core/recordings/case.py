@@ -1,7 +1,7 @@
 """A case: a rig, the recordings made on it in their order, and test recordings to predict."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -120,7 +120,7 @@ def read_case(folder: str | Path, report: Callable[[str], None] | None = None) -
         raise RecordingError(f"{folder}: is not a folder with a rig.toml")
     path = folder / "rig.toml"
     tables = read_toml(path, RigError)
-    rig = _with_both_constants(Rig.from_tables(tables, where=str(path)))
+    rig = Rig.from_tables(tables, where=str(path)).with_both_constants()
     listed = _recording_tables(tables, path)
     shared = tables.get("columns")
     recordings = tuple(
@@ -129,19 +129,6 @@ def read_case(folder: str | Path, report: Callable[[str], None] | None = None) -
     if not any(r.role == "identification" for r in recordings):
         raise RecordingError(f'{path}: no recording has the role "identification"')
     return Case(name=folder.resolve().name, folder=folder, rig=rig, recordings=recordings)
-
-
-def _with_both_constants(rig: Rig) -> Rig:
-    """Torque constant and back-EMF constant are one number in SI units: stated once is enough.
-
-    A rig without a winding's resistance, whose current is given, needs the first one alone.
-    """
-    k_t, k_e = rig.torque_constant_Nm_per_A, rig.back_emf_constant_Vs_per_rad
-    if k_t is None and k_e is not None:
-        return replace(rig, torque_constant_Nm_per_A=k_e)
-    if k_e is None and k_t is not None and rig.terminal_resistance_ohm is not None:
-        return replace(rig, back_emf_constant_Vs_per_rad=k_t)
-    return rig
 
 
 def read_test(folder: str | Path, rig: Rig) -> tuple[InputRecording, ...]:

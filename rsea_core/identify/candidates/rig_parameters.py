@@ -104,7 +104,7 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             tolerance = float(np.hypot(tolerance, stated.get("load_distance_m", 0.0)))
         if tolerance == 0.0:
             continue
-        if _inertia_left_out_beside(key, rig):
+        if _shares_unstated_inertia(key, rig):
             tolerance = float(np.hypot(tolerance, UNKNOWN_INERTIA))
         if key == "load_viscous_Nms_per_rad" and value:
             tolerance = float(np.hypot(tolerance, np.log1p(_unstated_damping_std(rig) / value)))
@@ -142,7 +142,7 @@ def _damping_left_out(rig: Rig, keys: list) -> list[str]:
     ] if rig.has("spring") else []  # fmt: skip
 
 
-def _inertia_left_out_beside(key: str, rig: Rig) -> bool:
+def _shares_unstated_inertia(key: str, rig: Rig) -> bool:
     """Whether a value is an inertia of a rigid train of which the file leaves another one out."""
     if not rig.has("gear") or not rig.has("load") or rig.has("spring"):
         return False

@@ -41,7 +41,7 @@ from rsea_core.identify.whole_runs.nearly_complete import (
     nearly_complete,
 )
 from rsea_core.identify.whole_runs.parameters_alone import parameters_alone
-from rsea_core.identify.whole_runs.search import WholeSearch, begun_with_rival
+from rsea_core.identify.whole_runs.search import WholeSearch, begun_with_rival, explained_once
 from rsea_core.identify.whole_runs.sensor_noise import (
     converged,
     excess,
@@ -123,7 +123,7 @@ def concluded(
             return finished
     if found.sound:  # an error that small is not evidence of a law that explains a part of it
         return found, None
-    found = replace(found, explained_once=search.explained_once())
+    found = replace(found, explained_once=explained_once(search))
     nearly = nearly_complete(found, search, say)
     other = _with_other_timing(search, say) if again and search.taken else None
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):

@@ -191,12 +191,6 @@ class WholeSearch(TakenLaws):
                 return
             self.prune(say)
 
-    def explained_once(self) -> float:
-        """Share of what parameters leave that the first law explains, if it acts once; else 0."""
-        first = self.first[0] if self.first else None
-        once = first is not None and first.law.effect == LoadDisturbance.effect
-        return first.gain / max(self.found.excess, 1.0) if once else 0.0
-
     def begun_at_bound(self, say) -> "WholeSearch | None":
         """A search that begins with a law that fitted best alone, but at a bound.
 
@@ -374,6 +368,13 @@ def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[T
 def worth(trial: Trial) -> float:
     """Gain of a law less a price: dependent errors give every further value some gain."""
     return trial.gain - RICHER_GAIN * count_values(trial.law)
+
+
+def explained_once(search: WholeSearch) -> float:
+    """Share of what parameters leave that the first law explains, if it acts once; else 0."""
+    first = search.first[0] if search.first else None
+    once = first is not None and first.law.effect == LoadDisturbance.effect
+    return first.gain / max(search.found.excess, 1.0) if once else 0.0
 
 
 def plainest(trials: Sequence[Trial], doubt: float) -> Trial:

@@ -21,7 +21,7 @@ def opinion(error: float, alone: float):
     ]
     found = SimpleNamespace(complete=False, explained=0.0)
     doubtful = SimpleNamespace(found=found, estimator=SimpleNamespace(tempering=0.1))
-    document = {"verdict": "missing-physics", "fit": {"recordings": rows}}
+    document = {"verdict": "missing-physics", "fit": {"recordings": rows}, "effects": []}
     return SimpleNamespace(document=document, conclusion=doubtful)
 
 
@@ -63,6 +63,30 @@ def test_complete_laws_of_windows_replace_those_of_free_runs_that_leave_much(
     opinions = {name: opinion(0.1, 1.0) for name in ("windows", "free runs")}
     opinions["windows"].conclusion.found.complete = complete
     opinions["free runs"].conclusion.explained_excess = lambda: explained
+    monkeypatch.setattr(f"{HERE}.is_bench", lambda case: True)
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
+    assert diagnose(case) is opinions[taken]
+
+
+@pytest.mark.parametrize(
+    ("name", "complete", "taken"),
+    [
+        ("load-unbalance", True, "windows"),
+        ("sensor-offset", True, "windows"),
+        ("sensor-offset", False, "free runs"),
+        ("load-friction", True, "free runs"),  # windows are not asked
+    ],
+)
+def test_complete_laws_of_windows_replace_what_acts_like_an_amplifier_offset(
+    tmp_path, monkeypatch, name, complete, taken
+):
+    """A finger's offset was named an eccentric mass, beside both right laws (27001/n18)."""
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    opinions = {name: opinion(0.1, 1.0) for name in ("windows", "free runs")}
+    opinions["windows"].conclusion.found.complete = complete
+    opinions["free runs"].conclusion.explained_excess = lambda: 0.99
+    opinions["free runs"].document["effects"].append({"name": name})
     monkeypatch.setattr(f"{HERE}.is_bench", lambda case: True)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])

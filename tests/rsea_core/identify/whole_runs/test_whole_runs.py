@@ -19,7 +19,7 @@ from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from rsea_core.identify.multistep.tracks import prepared
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs, with_whole_runs
-from rsea_core.identify.whole_runs.search import WholeSearch, worth
+from rsea_core.identify.whole_runs.search import explained_once, worth
 from rsea_core.identify.whole_runs.sensor_noise import in_noise_left_by, in_sensor_noise, misfit
 from rsea_core.identify.whole_runs.taken_laws import Trial
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
@@ -143,7 +143,7 @@ def test_a_shape_that_explains_most_of_whole_recordings_is_kept_where_no_law_was
 def test_of_a_first_law_that_acts_once_the_share_of_the_excess_is_known(law, share):
     first = [] if law is None else [SimpleNamespace(law=SimpleNamespace(effect=law), gain=80.0)]
     search = SimpleNamespace(first=first, found=SimpleNamespace(excess=100.0))
-    assert WholeSearch.explained_once(search) == share
+    assert explained_once(search) == share
 
 
 def test_a_law_with_more_values_takes_the_place_of_one_that_is_not_quite_it(tmp_path):
