@@ -40,6 +40,7 @@ from rsea_core.identify.whole_runs.complete import (
     of_first_growth,
     with_whole_runs,
 )
+from rsea_core.identify.whole_runs.parameters_alone import found_sound
 from rsea_core.identify.whole_runs.sensor_noise import refitted_from_rig
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
 from rsea_core.recordings.case import Case
@@ -61,7 +62,7 @@ def investigate(
         say(f"{file}: two thirds are fitted: {why}")
     nearly = None
     if quick:
-        found = begun(case, None, say, quick=True)
+        found = found_sound(begun(case, None, say, quick=True), say)
     else:
         found, nearly = _whole_recordings(case, say)
         missed = unpredicted_recordings(found) if found.sound and not found.complete else []

@@ -94,6 +94,7 @@ SENSOR_COLOUR_ROWS = 20  # time constant of a sensor's coloured noise at most; l
 SENSORS_ALONE = 0.003  # of the estimated unknown torques, where the sensors' noise is all there is
 COMPLETE = 1.6  # misfit of whole recordings in noise deviations that is as good as none
 SOUND = 2.0  # misfit of parameters alone, below which they are sufficient
+BRIEFLY_SOUND = 1.1  # misfit of parameters alone, below which a brief look seeks no law
 SOUND_IN_LEFT_NOISE = 1.4  # the same in the noise that the best law leaves
 LEAST_EXCESS = 100.0  # cost above that of noise, from which a law is tried all the same
 ZERO_SHARE = 0.5  # of a reading's excess in one recording: the least that its zero explains

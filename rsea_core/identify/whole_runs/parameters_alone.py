@@ -4,9 +4,14 @@ In windows the engine's error stays small. Over a whole recording of a machine w
 torque it accumulates, and where sensors are precise it is mistaken for missing physics.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import (
+    BRIEFLY_SOUND,
+    LEAST_EXCESS,
     LEAST_FINENESS,
     SOUND,
     STEP_ERROR,
@@ -14,7 +19,14 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import in_steps
-from rsea_core.identify.whole_runs.sensor_noise import misfit, well_fitted
+from rsea_core.identify.whole_runs.sensor_noise import (
+    excess,
+    in_sensor_noise,
+    misfit,
+    well_fitted,
+)
+
+BRIEF = 4  # iterations from the end of windows, by which a brief look tells a sound machine
 
 
 def parameters_alone(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Estimate, float]:
@@ -30,6 +42,23 @@ def parameters_alone(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Est
     if SOUND < left < np.inf:
         own, plain, left = _in_fine_steps(own, well_fitted(own, plain), say)
     return own, plain, left
+
+
+def found_sound(found: Found, say) -> Found:
+    """A brief look's search that knows whether parameters leave nothing but noise, or the same.
+
+    Nothing is known where more is left: a brief look does not search whole recordings.
+    """
+    if found.base_horizon is not None:
+        return found
+    own = in_sensor_noise(found.base_estimator, found.base)
+    h = found.base.hypothesis
+    fit = own.fit(h, found.base.x, iterations=BRIEF)
+    left, more = misfit(own, h, fit.x), excess(own, h, fit.x)
+    if not left < (SOUND if more < LEAST_EXCESS else BRIEFLY_SOUND):
+        return found
+    say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
+    return replace(found, left_by_parameters=left, excess=more)
 
 
 def _in_fine_steps(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Estimate, float]:

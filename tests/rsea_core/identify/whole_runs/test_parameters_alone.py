@@ -5,15 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.identify.law_search.search import begun
 from rsea_core.identify.multistep.criteria import SOUND
 from rsea_core.identify.multistep.experiment import EngineSteps
 from rsea_core.identify.multistep.horizons import in_steps
 from rsea_core.identify.multistep.tracks import prepared
-from rsea_core.identify.whole_runs.parameters_alone import parameters_alone, step_error
+from rsea_core.identify.whole_runs.parameters_alone import (
+    found_sound,
+    parameters_alone,
+    step_error,
+)
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.model.actuator_model import ActuatorModel
-from tests.cases.one_axis import axis_recording, axis_rig
+from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 from tests.cases.whole_runs import searched_axis
 
 NOISE_rad = 1e-6
@@ -56,3 +62,16 @@ def test_recordings_may_have_different_readings(tmp_path):
     _, own, plain = searched_axis(tmp_path, given, replace(other, columns=both))
     half = in_steps(own, own.problem.steps._replace(fineness=0.5))
     assert 0.0 < step_error(own, half, plain) < 1.0
+
+
+@pytest.mark.parametrize(("friction_Nm", "sound"), [(0.0, True), (0.06, False)])
+def test_a_brief_look_knows_that_parameters_alone_leave_nothing_but_noise(
+    tmp_path, friction_Nm, sound
+):
+    case = axis_case(
+        tmp_path, axis_recording(LoadFriction(coulomb_Nm=friction_Nm), seed=1), rig=axis_rig()
+    )
+    found = begun(case, None, lambda text: None, quick=True)
+    assert found_sound(found, lambda text: None).sound is sound
+    unpredictable = replace(found, base_horizon=0.5)
+    assert found_sound(unpredictable, lambda text: None) is unpredictable
