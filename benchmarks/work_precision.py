@@ -137,7 +137,7 @@ def full_plant() -> bool:
     """The full plant; MuJoCo has a part of it."""
     peer = in_c(full.MJCF, 1e-3, "implicitfast", full.TARGET, FULL_NUMBERS)
     full.product()
-    (ours, theirs), _ = interleaved(time.process_time, 5, full.product, peer)
+    (ours, theirs), _ = interleaved(time.process_time, ROUNDS, full.product, peer)
     print("full plant, CPU time for 10 s (MuJoCo computes less, see benchmarks.full_plant):")
     print(f"  ours {ours * 1e3:.3f} ms, MuJoCo in C, 1 ms: {theirs * 1e3:.3f} ms")
     return judged("x MuJoCo in C", theirs / ours, FULL_TARGET)

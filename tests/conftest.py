@@ -42,18 +42,21 @@ def long_tests() -> list[str]:
     return _listed(LONG_TESTS)
 
 
-def _listed(file: Path) -> list[str]:
+def _rows(file: Path) -> list[list[str]]:
+    """Seconds and test of each row of a list."""
     lines = file.read_text(encoding="utf-8").splitlines()
-    return [line.split(maxsplit=1)[1] for line in lines if line and not line.startswith("#")]
+    return [line.split(maxsplit=1) for line in lines if line and not line.startswith("#")]
+
+
+def _listed(file: Path) -> list[str]:
+    return [test for _, test in _rows(file)]
 
 
 def _seconds_of_files() -> Counter[str]:
     """CPU seconds of each file's slow tests."""
     found: Counter[str] = Counter()
-    for line in SLOW_TESTS.read_text(encoding="utf-8").splitlines():
-        if line and not line.startswith("#"):
-            seconds, test = line.split(maxsplit=1)
-            found[test.partition("::")[0]] += float(seconds)
+    for seconds, test in _rows(SLOW_TESTS):
+        found[test.partition("::")[0]] += float(seconds)
     return found
 
 

@@ -5,8 +5,8 @@ bridge, every sensor and rows of a millisecond (`is_bench`). Everywhere else law
 predictions over windows with estimated starts and an estimated noise (`multistep`). Where that
 leaves dependent innovations - no law fits the machine quite - free runs are a second opinion, and
 the model that predicts the recordings held out better speaks. The bench asks windows so where its
-free runs find no name, names that leave much, or what an amplifier's offset could be: these do not
-know the errors of a log.
+free runs find no name, names that leave much, or one that an amplifier's offset imitates: free runs
+do not model the errors of a log.
 """
 
 from collections.abc import Callable
@@ -86,7 +86,7 @@ def diagnose(
     if is_bench(case):
         found = diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
         if not quick and (_leaves_much(found) or _may_be_an_offset(case, found)):
-            say("laws leave much, or act like an amplifier offset: a second opinion by windows")
+            say("laws leave much, or an offset imitates one: a second opinion by windows")
             other = diagnose_windows(case, say=say)
             return other if other.conclusion.found.complete else found
         if quick or not case.validation or found.document["verdict"] != "unexplained":
@@ -116,7 +116,7 @@ def _leaves_much(found: Diagnosis) -> bool:
 
 
 def _may_be_an_offset(case: Case, found: Diagnosis) -> bool:
-    """Whether a law of free runs acts like an offset of the amplifier, which these do not know.
+    """Whether an amplifier's offset, which free runs do not model, imitates a law that they name.
 
     A constant torque of the drive is an eccentric mass over a small angle, and behind a spring a
     zero error of an angle.

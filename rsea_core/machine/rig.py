@@ -134,9 +134,10 @@ class Rig:
         return part in self.parts
 
     def with_both_constants(self) -> "Rig":
-        """Torque constant and back-EMF constant are one number in SI units: one is enough.
+        """The rig with an absent torque or back-EMF constant set to the stated one of the two.
 
-        A rig without a winding's resistance, whose current is given, needs the first one alone.
+        In SI units they are one number. Without a resistance of the winding no back-EMF constant is
+        set: where the current is given, none is needed.
         """
         k_t, k_e = self.torque_constant_Nm_per_A, self.back_emf_constant_Vs_per_rad
         if k_t is None and k_e is not None:

@@ -237,8 +237,8 @@ class ActuatorModel:
         elastic = self.structure(load) in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
         turns = self._at_output("inertia_kgm2") > 0.0  # as one body with the load, if rigid
         moves = rig.has("load") and not load.is_held
-        stated = moves and rig.load_inertia_kgm2
-        if rig.has("gear") and command_name != POSITION_COMMAND and (elastic or not stated):
+        known = turns or (moves and rig.load_inertia_kgm2)
+        if rig.has("gear") and command_name != POSITION_COMMAND and (elastic or not known):
             rig.need("the wheel's motion", "motor_inertia_kgm2")
         if moves and (elastic or not turns):
             rig.need(f'the load "{load.kind}"', "load_inertia_kgm2")

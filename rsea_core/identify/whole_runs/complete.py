@@ -374,7 +374,7 @@ def _with_shape(found: Found, own: Estimator, say) -> Found:
         return found
     share = best.held_out / had
     say(f"whole recordings: {best.sentence()}, explains {share:.2f} of the excess")
-    if share < max(SHAPE_SHARE, found.explained_once):  # less than an error of one time
+    if share < max(SHAPE_SHARE, found.explained_once):  # a torque that acts once explains more
         return found
     return replace(found, base_shapes=[best, *found.base_shapes])
 

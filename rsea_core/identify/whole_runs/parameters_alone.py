@@ -26,7 +26,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     well_fitted,
 )
 
-BRIEF = 4  # iterations from the end of windows, by which a brief look tells a sound machine
+BRIEF = 4  # iterations of that fit, from the values that windows ended with
 
 
 def parameters_alone(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Estimate, float]:
@@ -45,9 +45,9 @@ def parameters_alone(own: Estimator, fit: Estimate, say) -> tuple[Estimator, Est
 
 
 def found_sound(found: Found, say) -> Found:
-    """A brief look's search that knows whether parameters leave nothing but noise, or the same.
+    """The search with the misfit of parameters alone over whole recordings, if they suffice.
 
-    Nothing is known where more is left: a brief look does not search whole recordings.
+    For `--quick`, which does not search whole recordings: the same search where they do not.
     """
     if found.base_horizon is not None:
         return found

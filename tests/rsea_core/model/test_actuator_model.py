@@ -247,9 +247,13 @@ def test_machine_that_lacks_something_says_what(changes, inputs, error, message)
     assert "\n" not in str(caught.value)
 
 
-def test_a_rigid_train_without_stated_load_inertia_turns_with_the_motors_alone():
-    """w = tau t/J, from a held motor torque."""
-    rig = Rig(name="axis", parts=("drive", "gear", "load"), motor_inertia_kgm2=2e-4, gear_ratio=5.0)
+@pytest.mark.parametrize(
+    "stated",
+    [{"motor_inertia_kgm2": 2e-4}, {"output_inertia_kgm2": 5e-3}, {"load_inertia_kgm2": 5e-3}],
+)
+def test_one_stated_inertia_of_a_rigid_train_is_enough(stated):
+    """w = tau t/J, from a held motor torque; the output's inertia is 25 times the motor's."""
+    rig = Rig(name="axis", parts=("drive", "gear", "load"), gear_ratio=5.0, **stated)
     torque = np.full(SECONDS.size, 0.01)
     given = Inputs(time_s=SECONDS, motor_torque_Nm=torque, load=Load(kind="free"))
     speed = simulate(ActuatorModel(rig), given).motor_velocity_rad_per_s
