@@ -12,6 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.found import Found, from_growth
 from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
@@ -21,6 +22,7 @@ from rsea_core.identify.law_search.shorter_windows import in_shorter_windows, pr
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     DOUBTED_SHARE,
+    LEFT_OF_EACH,
     NEEDS_NO_WINDOWS,
     TIMING_SHARE,
 )
@@ -41,7 +43,7 @@ from rsea_core.identify.whole_runs.complete import (
     with_whole_runs,
 )
 from rsea_core.identify.whole_runs.parameters_alone import found_sound
-from rsea_core.identify.whole_runs.sensor_noise import refitted_from_rig
+from rsea_core.identify.whole_runs.sensor_noise import misfit, refitted_from_rig
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
 from rsea_core.recordings.case import Case
 
@@ -72,7 +74,7 @@ def investigate(
             say(f"not predicted, searched again with two thirds of them: {', '.join(missed)}")
             found, nearly = _whole_recordings(case, say)
         if nearly is not None and nearly.explained > NEEDS_NO_WINDOWS:
-            found = nearly
+            found = _with_gear_mesh_in_whole_runs(case, nearly, say)
     if not (found.complete or found.sound):
         add_all(found, laws_of(found), say, quick=quick)
         found = _in_doubt(case, found, say, quick=quick)
@@ -141,6 +143,27 @@ def _through_gear_mesh(case: Case, found: Found, say) -> Found:
     say("searched again: the encoders of a rigid train disagree; now with an elastic gear mesh")
     other = searched(elastic[0], found.problem.timing, say, mesh=elastic[1])
     return other if other.steps else found
+
+
+def _with_gear_mesh_in_whole_runs(case: Case, nearly: Found, say) -> Found:
+    """Laws that are nearly complete, with backlash where the encoders of a rigid train disagree.
+
+    The laws given stand where backlash in an elastic mesh explains little of what they leave.
+    """
+    elastic = with_gear_mesh(case) if encoders_disagree(nearly) else None
+    if elastic is None:
+        return nearly
+    say("whole recordings: the encoders of a rigid train disagree; now with an elastic gear mesh")
+    found = begun(elastic[0], nearly.problem.timing, say, mesh=elastic[1])
+    effects = frozenset((GearBacklash.effect, *(step.law.effect for step in nearly.steps)))
+    end, more = concluded(*laws_added(found, say, effects=effects), say, again=False)
+    for other in (end, more):
+        if other is None or not any(s.law.effect == GearBacklash.effect for s in other.steps):
+            continue
+        left, before = (misfit(f.estimator, f.best.hypothesis, f.best.x) for f in (other, nearly))
+        if left < LEFT_OF_EACH * before:
+            return other
+    return nearly
 
 
 def _doubtful(found: Found) -> bool:

@@ -8,6 +8,7 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.files.csv_columns import unit_of
 from rsea_core.identify.clamped_loads import with_yielding_clamps
+from rsea_core.identify.fitting.truncation import truncate
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.gear_mesh import as_effect
 from rsea_core.identify.multistep.command_timing import CommandTiming, RowTimes
@@ -23,6 +24,11 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
 
+ROWS_QUICK = 2500  # of all recordings fitted
+QUICK_LOOK = Finding(
+    kind=Kind.METHOD,
+    text="a quick look: few candidates were fitted; run without --quick before acting on it",
+)
 OF_THE_LOG = (CLOCK, FILTER, RATIO)
 OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is stated
 NEGLIGIBLE_OFFSET = 1e-4  # of the largest command: a smaller one is not stated
@@ -41,8 +47,11 @@ def diagnose_windows(
     """
     case, filled = with_servo_gains(case)
     case, clamps = with_yielding_clamps(case)
+    cut: tuple[Finding, ...] = ()
+    if quick:
+        case, cut = truncate(case, np.inf, ROWS_QUICK, instead="without --quick all of it is")
     conclusion = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
-    findings = [Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps]
+    findings = [*cut, *([QUICK_LOOK] if quick else [])] + [Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps]
     findings += findings_of(conclusion) + servo_findings(conclusion, filled)
     laws = _model_laws(conclusion)
     rig, problem = conclusion.rig(), conclusion.problem

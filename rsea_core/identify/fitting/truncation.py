@@ -14,15 +14,20 @@ from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 MOST_STEPS, MOST_STEPS_QUICK = 60_000, 30_000  # of one replay of all fitted recordings
+WHOLE = "--thorough takes all of it"
 
 
-def truncate(case: Case, step_s: float, most: int) -> tuple[Case, tuple[Finding, ...]]:
+def truncate(
+    case: Case, step_s: float, most: int, *, instead: str = WHOLE
+) -> tuple[Case, tuple[Finding, ...]]:
     """The case with at most so many steps in a replay of its identification recordings.
 
     Parameters
     ----------
     step_s : float
         Longest step of a replay; every row takes one at least.
+    instead : str
+        How all of it is fitted.
 
     Returns
     -------
@@ -45,7 +50,7 @@ def truncate(case: Case, step_s: float, most: int) -> tuple[Case, tuple[Finding,
         text = (
             f"only its first {rows * r.sample_time_s:.4g} s of"
             f" {r.rows * r.sample_time_s:.4g} s were fitted: all recordings together are longer"
-            " than a diagnosis can replay in its time (--thorough takes all of it)"
+            f" than a diagnosis can replay in its time ({instead})"
         )
         findings.append(Finding(kind=Kind.TRUNCATED, text=text, file=r.file))
     return replace(case, recordings=tuple(kept)), tuple(findings)

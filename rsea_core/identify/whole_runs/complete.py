@@ -15,7 +15,6 @@ from rsea_core.identify.law_search.search import begun, laws_of
 from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.command_timing import CommandTiming, timings
 from rsea_core.identify.multistep.criteria import (
-    ALIKE_EXCESS,
     COMPLETE,
     COMPLETE_SHARE,
     EXPLAINED,
@@ -24,7 +23,6 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     NEARLY_EXPLAINED,
-    SAME_END,
     SHAPE_SHARE,
     SOUND,
     SOUND_IN_LEFT_NOISE,
@@ -71,11 +69,15 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     return concluded(*laws_added(found, say), say, again=again)
 
 
-def laws_added(found: Found, say, *, known: WholeSearch | None = None) -> tuple[Found, WholeSearch]:
+def laws_added(
+    found: Found, say, *, known: WholeSearch | None = None, effects: frozenset[str] | None = None
+) -> tuple[Found, WholeSearch]:
     """Parameters alone over whole recordings, and laws added as long as they leave too much.
 
     Parameters
     ----------
+    effects : frozenset of str or None
+        Of the laws tried; None: of all that the case can have.
     known : WholeSearch or None
         From another growth of windows. It is continued if parameters alone cost as much with its
         values.
@@ -84,7 +86,7 @@ def laws_added(found: Found, say, *, known: WholeSearch | None = None) -> tuple[
     own, plain, left = parameters_alone(own, found.base, say)
     other = with_single_zeros(found, own, plain, say)
     if other is not found:
-        return laws_added(other, say)
+        return laws_added(other, say, effects=effects)
     say(f"whole recordings: parameters alone leave {left:.2f} deviations of the sensors' noise")
     found = replace(found, left_by_parameters=left)
     if left <= SOUND and is_coloured(found.base_estimator):
@@ -92,19 +94,21 @@ def laws_added(found: Found, say, *, known: WholeSearch | None = None) -> tuple[
         found = replace(found, left_by_parameters=left, sound_below=SOUND_IN_LEFT_NOISE)
     found = replace(found, excess=excess(own, plain.hypothesis, plain.x))
     say(f"whole recordings: these errors cost {found.excess:.0f} units more than noise")
-    search = WholeSearch(own, plain, found, laws_of(found), _enough(left))
-    if known is not None and _begins_alike(known, search):
+    laws = [w for w in laws_of(found) if effects is None or w.effect in effects]
+    search = WholeSearch(own, plain, found, laws, _enough(left))
+    if known is not None and known.begins_like(search):
         known.found = found
         return found, known
     if found.needs_no_law:
         return found, search
     for _ in range(1 if found.sound else WHOLE_LAWS):
-        if search.left() <= search.enough or not search.add(say):
+        all_taken = effects is not None and effects <= {law.effect for law in search.taken}
+        if search.left() <= search.enough or all_taken or not search.add(say):
             break
         search.prune(say)
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
-            return laws_added(other, say)
+            return laws_added(other, say, effects=effects)
     rival = None if found.sound else begun_with_rival(search, say)
     return found, rival or search
 
@@ -156,15 +160,6 @@ def of_first_growth(found: Found, search: WholeSearch, say) -> tuple[Found | Non
         if _with_timing(own, timing, fit.hypothesis, fit.x).cost < fit.cost - search.doubt():
             return found, True
     return found, False
-
-
-def _begins_alike(known: WholeSearch, search: WholeSearch) -> bool:
-    """Whether parameters alone cost as much with the values and the timing of another search."""
-    if known.own.problem.timing != search.own.problem.timing:
-        return False
-    h, x = search.plain.hypothesis, known.plain.x
-    more = float(search.own.costs([(h, x)])[0]) - search.plain.cost
-    return abs(more) < SAME_END + ALIKE_EXCESS * search.excess()
 
 
 def _finished(

@@ -11,10 +11,12 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.richer_laws import begun_with
 from rsea_core.identify.law_search.screening import Candidate, screen, screen_again
 from rsea_core.identify.multistep.criteria import (
+    ALIKE_EXCESS,
     DOUBT,
     NEIGHBOURS,
     PER_VALUE,
     RIVAL_SCALE,
+    SAME_END,
     WHOLE_FORMS,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -81,6 +83,14 @@ class TakenLaws:
     def plain_excess(self) -> float:
         """What parameters alone leave above the noise, in units."""
         return max(self.plain.cost - self.fit.cost, 0.0) + 1.0
+
+    def begins_like(self, other: "TakenLaws") -> bool:
+        """Whether parameters alone cost as much with the values and timing of another search."""
+        if self.own.problem.timing != other.own.problem.timing:
+            return False
+        h, x = other.plain.hypothesis, self.plain.x
+        more = float(other.own.costs([(h, x)])[0]) - other.plain.cost
+        return abs(more) < SAME_END + ALIKE_EXCESS * other.excess()
 
     def take(self, best: Trial, fit: Estimate, trials: Sequence[Trial], say) -> None:
         """A trial's law, with its fit of whole recordings."""
