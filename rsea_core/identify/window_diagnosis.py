@@ -51,7 +51,9 @@ def diagnose_windows(
     if quick:
         case, cut = truncate(case, np.inf, ROWS_QUICK, instead="without --quick all of it is")
     conclusion = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
-    findings = [*cut, *([QUICK_LOOK] if quick else [])] + [Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps]
+    findings = [*cut, *([QUICK_LOOK] if quick else [])] + [
+        Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps
+    ]
     findings += findings_of(conclusion) + servo_findings(conclusion, filled)
     laws = _model_laws(conclusion)
     rig, problem = conclusion.rig(), conclusion.problem

@@ -165,11 +165,7 @@ def unknown_torque(estimator: Estimator, error: float) -> str | None:
     Of the mean over `Scale.time_s`, the root mean square. `error` is that of the predictions over
     the spread of the readings: where nothing pulls a machine back, a small torque moves it far.
     """
-    found = []
-    for t in estimator.tracks:
-        size, usual = float(np.hypot(*t.noise.inputs[:2])), float(max(t.scale.torque_Nm))
-        found.append((size / usual if usual > 0.0 else 0.0, size, t.scale.time_s))
-    share, size, time_s = max(found)
+    share, size, time_s = _largest_unknown_torque(estimator)
     if size == 0.0 or (share < UNKNOWN_SHARE and error < DOUBTED_ERROR):
         return None
     linear = estimator.problem.case.rig.axis == "linear"
@@ -178,6 +174,20 @@ def unknown_torque(estimator: Estimator, error: float) -> str | None:
         f"an unknown {what} of {size:.2g} {unit}, averaged over {time_s:.2g} s"
         f" ({100.0 * share:.2g} % of the usual {what})"
     )
+
+
+def unknown_share(estimator: Estimator) -> float:
+    """That torque over the usual one, of the recording with the largest share."""
+    return _largest_unknown_torque(estimator)[0]
+
+
+def _largest_unknown_torque(estimator: Estimator) -> tuple[float, float, float]:
+    """Share of the usual torque, size [Nm], and the time of the mean [s]."""
+    found = []
+    for t in estimator.tracks:
+        size, usual = float(np.hypot(*t.noise.inputs[:2])), float(max(t.scale.torque_Nm))
+        found.append((size / usual if usual > 0.0 else 0.0, size, t.scale.time_s))
+    return max(found)
 
 
 def rungs_of(steps: Sequence[Step], parameters: FoundFit, fit: FoundFit) -> list[dict]:

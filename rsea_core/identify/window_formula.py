@@ -14,7 +14,8 @@ from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.formula_torque import FORMULAS, FormulaTorque, formula_law
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.formula.sparse_regression import Selection, select
+from rsea_core.identify.formula.sparse_regression import STATES, Selection, select
+from rsea_core.identify.formula.varying_inertia import VaryingInertia, varying_inertia
 from rsea_core.identify.law_search.candidate_fits import at_bound, confirmed, gain_of, settled
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.law_search.hold_out import held_out
@@ -22,11 +23,16 @@ from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.shape_search import Shape, ports
 from rsea_core.identify.multistep.criteria import (
     FURTHER_GAIN,
+    INERTIA_GAIN,
+    INERTIA_LEAST,
+    INERTIA_RATIO,
     KEPT_RATIO,
     LEAST_GAIN,
+    LEAST_RATIO,
     PER_VALUE,
     SHAPE_GAIN,
     SHAPE_RATIO,
+    UNEVEN_GAIN,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.window_fit import fit_of, spread_of
@@ -136,13 +142,13 @@ class CommandFormula:
 def unnamed_formula(
     found: Found, shape: Shape | None, say: Callable[[str], None],
     instead: CommandFormula | None = None,
-) -> tuple[Shape | None, Formula | CommandFormula | None]:  # fmt: skip
+) -> tuple[Shape | None, Formula | CommandFormula | VaryingInertia | None]:  # fmt: skip
     """What has no name: its shape, and a formula of the command if that predicts, or of the motion.
 
-    A formula of the command takes the place of the shape; beside laws there is none. Where
-    parameters leave little more than noise, that formula alone is tried. Where commands are
-    smoothed, a torque on the body that they move is not reported: commands that the log lacks may
-    cause it.
+    A formula of the command, or an inertia that varies, takes the place of the shape; beside laws
+    there is none. Where parameters leave little more than noise, a formula of the command alone is
+    tried. Where commands are smoothed, a torque on the body that they move is not reported:
+    commands that the log lacks may cause it.
 
     Parameters
     ----------
@@ -161,7 +167,29 @@ def unnamed_formula(
         formula = command_formula_of(found, say)
         if formula is not None:
             return None, formula
+    inertia = inertia_of(found, shape, say)
+    if inertia is not None:
+        return None, inertia
     return shape, formula_of(found, shape, say)
+
+
+def inertia_of(
+    found: Found, shape: Shape | None, say: Callable[[str], None] = lambda _: None
+) -> VaryingInertia | None:
+    """An inertia that varies with the angle; None where a shape says as much, or none is seen.
+
+    It gains where the motion is fast: the gain is less even than that of a torque.
+    """
+    projection = Projection(found.base_estimator, found.base)
+    places = [port for port in ports(found.base_estimator.tracks[0]) if port in STATES]
+    waves = [varying_inertia(projection, found.base, port) for port in places]
+    best = max(filter(None, waves), key=lambda w: w.held_out, default=None)
+    if best is None:
+        return None
+    say(f"  {best.sentence()}: held-out gain {best.held_out:.1f} +- {best.deviation:.1f}")
+    least = max(INERTIA_GAIN, INERTIA_RATIO * best.deviation, shape.held_out if shape else 0.0)
+    seen = best.held_out > least and INERTIA_LEAST < best.share < 1.0
+    return best if seen else None
 
 
 def _beyond_spring(found: Found, shape: Shape | None) -> bool:
@@ -244,7 +272,8 @@ def formula_of(
     sizes = zip(chosen.coefficients, chosen.terms, strict=True)
     text = " + ".join(f"{size:.3g} {term.text()}" for size, term in sizes)
     say(f"  formula {text}: held-out gain {chosen.held_out:.1f} +- {chosen.deviation:.1f}")
-    least = max(SHAPE_GAIN, SHAPE_RATIO * chosen.deviation)
+    ratio = LEAST_RATIO if chosen.held_out > UNEVEN_GAIN else SHAPE_RATIO
+    least = max(SHAPE_GAIN, ratio * chosen.deviation)
     if chosen.held_out < max(least, OF_SHAPE * (shape.held_out if shape else 0.0)):
         return None
     return _fitted(found, chosen, shape, say)

@@ -33,6 +33,7 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_RATIO,
     UNCLAIMED,
     UNEVEN_GAIN,
+    UNKNOWN_MOST,
     WORSE,
 )
 from rsea_core.identify.multistep.horizons import relative_error
@@ -48,6 +49,7 @@ from rsea_core.identify.window_fit import (
     rungs_of,
     spread_of,
     strained_value,
+    unknown_share,
     unknown_torque,
 )
 from rsea_core.identify.window_formula import (
@@ -93,6 +95,7 @@ class WindowVerdict(Conclusion):
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
         self.dependent &= not found.sound and not self.problem.timing.smooth
+        self.unaccounted = doubted and unknown_share(self.estimator) > UNKNOWN_MOST
         self.reason = _reason_of(self)
         self.verdict = self._verdict()
 
@@ -136,7 +139,7 @@ class WindowVerdict(Conclusion):
             return "unexplained" if much else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
-        if self.dependent:
+        if self.dependent or self.unaccounted:
             return "unexplained"
         return "no-mismatch" if self._rig_is_right() else "parameters-only"
 
@@ -342,6 +345,8 @@ def _reason_of(judged: WindowVerdict) -> str | None:
             "no law fits; the rig's values alone predict with an error of"
             f" {100 * judged.error:.1f} % of the spread, and the innovations are dependent"
         )
+    if judged.unaccounted:
+        return f"no law fits; the rig's values alone leave {judged.unknown_torque}"
     return None
 
 

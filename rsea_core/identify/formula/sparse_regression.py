@@ -101,16 +101,24 @@ def blocks_of(projection: Projection, port: str) -> tuple[Blocks, list[int], flo
     tracks = projection.estimator.tracks
     angle, speed = STATES[port]
     usual = float(np.sqrt(np.mean(np.concatenate([t.motion[:, speed] for t in tracks]) ** 2)))
-    columns = []
-    for term in LIBRARY:
-        part = [
+    columns = [
+        [
             response(t, port, term.values(t.motion[:, angle], t.motion[:, speed], usual))
             for t in tracks
         ]
-        columns.append(
-            projection.column([e + c for e, c in zip(projection.level, part, strict=True)])
-        )
-    C = np.array(columns)
+        for term in LIBRARY
+    ]
+    return *blocks_of_columns(projection, columns), usual
+
+
+def blocks_of_columns(
+    projection: Projection, columns: Sequence[Sequence[NDArray]]
+) -> tuple[Blocks, list[int]]:
+    """Normal equations of functions by their responses in each track, and those that are seen."""
+    C = np.array([
+        projection.column([e + c for e, c in zip(projection.level, part, strict=True)])
+        for part in columns
+    ])  # fmt: skip
     B = np.linalg.solve(projection.L, projection.J @ C.T)
     free = C - (projection.J.T @ np.linalg.solve(projection.L.T, B)).T
     whole, left = np.linalg.norm(C, axis=1), np.linalg.norm(free, axis=1)
@@ -121,7 +129,7 @@ def blocks_of(projection: Projection, port: str) -> tuple[Blocks, list[int], flo
     for b in range(count):
         rows = free[:, projection.blocks == b]
         XX[b], xy[b] = rows @ rows.T, rows @ projection.left[projection.blocks == b]
-    return Blocks(XX=XX, xy=xy), [int(j) for j in np.flatnonzero(seen)], usual
+    return Blocks(XX=XX, xy=xy), [int(j) for j in np.flatnonzero(seen)]
 
 
 def select(projection: Projection, port: str, *, seed: int = 0) -> Selection | None:

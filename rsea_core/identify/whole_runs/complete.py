@@ -23,6 +23,8 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
     NEARLY_EXPLAINED,
+    NOISE_RENEWED,
+    OVERSTATED_NOISE,
     SHAPE_SHARE,
     SOUND,
     SOUND_IN_LEFT_NOISE,
@@ -49,7 +51,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     misfit,
 )
 from rsea_core.identify.whole_runs.single_zeros import with_single_zeros
-from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
+from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without, without_redundant
 
 
 def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Found | None]:
@@ -74,6 +76,9 @@ def laws_added(
 ) -> tuple[Found, WholeSearch]:
     """Parameters alone over whole recordings, and laws added as long as they leave too much.
 
+    Laws that leave far less than the noise are searched again in the noise that they leave: it was
+    estimated without them, and too large a noise hides which of two laws is right.
+
     Parameters
     ----------
     effects : frozenset of str or None
@@ -83,6 +88,20 @@ def laws_added(
         values.
     """
     own = in_sensor_noise(found.base_estimator, found.base)
+    found, search = _laws_added(found, own, say, known, effects)
+    for _ in range(NOISE_RENEWED):
+        if not search.taken or search.left() > OVERSTATED_NOISE:
+            break
+        say(f"whole recordings: laws leave {search.left():.2f}: again in the noise that they leave")
+        own = in_noise_left_by(search.own, search.fit)
+        found, search = _laws_added(found, own, say, None, effects)
+    return found, search
+
+
+def _laws_added(
+    found: Found, own: Estimator, say, known: WholeSearch | None, effects: frozenset[str] | None
+) -> tuple[Found, WholeSearch]:
+    """As `laws_added`, in the noise of an estimator of whole recordings."""
     own, plain, left = parameters_alone(own, found.base, say)
     other = with_single_zeros(found, own, plain, say)
     if other is not found:
@@ -316,7 +335,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         found, fit, left = _closer_to_rig(found, own, fit, say)
     enough = _enough(found.left_by_parameters)
     if left <= enough:
-        found, fit = _without_redundant(found, own, fit, enough, say)
+        found, fit = without_redundant(found, own, fit, enough, say)
     if left > enough or not all(
         needed(own, fit, step.law, without(own, fit, step.law))[0] for step in found.steps
     ):
@@ -372,21 +391,6 @@ def _with_shape(found: Found, own: Estimator, say) -> Found:
     if share < max(SHAPE_SHARE, found.explained_once):  # a torque that acts once explains more
         return found
     return replace(found, base_shapes=[best, *found.base_shapes])
-
-
-def _without_redundant(
-    found: Found, own: Estimator, fit: Estimate, enough: float, say
-) -> tuple[Found, Estimate]:
-    """The search and its fit of whole recordings, without laws that leave as little if removed."""
-    for step in reversed(found.steps):
-        less = without(own, fit, step.law)
-        if len(found.steps) > 1 and misfit(own, less.hypothesis, less.x) <= enough:
-            say(f"  whole recordings: {step.law.key} is redundant")
-            fit = less
-            best = found.estimator.fit(less.hypothesis, less.x, iterations=8)
-            steps = [other for other in found.steps if other is not step]
-            found = replace(found, best=best, steps=steps)
-    return found, fit
 
 
 def _enough(left: float) -> float:

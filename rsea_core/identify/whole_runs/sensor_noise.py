@@ -122,7 +122,8 @@ def is_coloured(estimator: Estimator) -> bool:
 def in_noise_left_by(own: Estimator, fit: Estimate) -> Estimator:
     """Another estimator, the noise of each reading as large as the errors that a fit leaves.
 
-    Noise that was estimated while a law was missing includes the error that this law explains.
+    Noise that was estimated while a law was missing includes the error that this law explains. It
+    is no less than that of the counts.
     """
     left: dict[str, list[float]] = {}
     for t, e in zip(own.tracks, own.innovations([(fit.hypothesis, fit.x)]), strict=True):
@@ -132,7 +133,9 @@ def in_noise_left_by(own: Estimator, fit: Estimate) -> Estimator:
     tracks = []
     for t in own.tracks:
         share = np.array([max(left[name]) for name in t.experiment.channels])
-        tracks.append(prepared(t, noise=replace(t.noise, readings=share * t.noise.readings)))
+        least = np.minimum(t.experiment.floor_of_each / t.block**0.5, t.noise.readings)
+        readings = np.maximum(share * t.noise.readings, least)
+        tracks.append(prepared(t, noise=replace(t.noise, readings=readings)))
     return own.having(tracks)
 
 

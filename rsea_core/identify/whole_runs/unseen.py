@@ -28,7 +28,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.multistep.steps import normal_equations
 from rsea_core.identify.multistep.tracks import prepared
-from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
+from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise, misfit
 
 PREDICTION_STEPS = 3  # of Gauss and Newton, in a prediction
 
@@ -187,3 +187,18 @@ def predicted_cost(unseen: Estimator, own: Estimator, h: Hypothesis, x: NDArray)
 
 def _cost(own: Estimator, h: Hypothesis, x: NDArray) -> float:
     return sum(0.5 * float(np.sum(huber_squares(e))) for e in own.innovations([(h, x)]))
+
+
+def without_redundant(
+    found: Found, own: Estimator, fit: Estimate, enough: float, say
+) -> tuple[Found, Estimate]:
+    """The search and its fit of whole recordings, without laws that leave as little if removed."""
+    for step in reversed(found.steps):
+        less = without(own, fit, step.law)
+        if len(found.steps) > 1 and misfit(own, less.hypothesis, less.x) <= enough:
+            say(f"  whole recordings: {step.law.key} is redundant")
+            fit = less
+            best = found.estimator.fit(less.hypothesis, less.x, iterations=8)
+            steps = [other for other in found.steps if other is not step]
+            found = replace(found, best=best, steps=steps)
+    return found, fit
