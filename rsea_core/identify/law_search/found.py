@@ -12,13 +12,14 @@ from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.criteria import (
     LEAST_EXCESS,
     LOST,
+    NO_PREDICTION,
     SEARCH_STEPS,
     SOUND,
     UNEVEN_GAIN,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
-from rsea_core.identify.multistep.horizons import Growth, with_fine_steps
+from rsea_core.identify.multistep.horizons import Growth, relative_error, with_fine_steps
 from rsea_core.identify.multistep.timing_choice import with_mean_commands
 
 Entry = tuple[Candidate, Estimator, Estimate]
@@ -131,6 +132,12 @@ class Found:
     def needs_no_law(self) -> bool:
         """Whether parameters alone leave no more than noise, or predict no whole recording."""
         return (self.sound and not self.beyond_noise) or not self.left_by_parameters < np.inf
+
+    @property
+    def unpredicted(self) -> bool:
+        """Whether no values of the parameters alone predict even windows."""
+        own, base = self.base_estimator, self.base
+        return relative_error(own, base.hypothesis, base.x) > NO_PREDICTION
 
     @property
     def beyond_noise(self) -> bool:

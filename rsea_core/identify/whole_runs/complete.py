@@ -16,12 +16,11 @@ from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.command_timing import CommandTiming, timings
 from rsea_core.identify.multistep.criteria import (
     COMPLETE,
-    COMPLETE_SHARE,
-    EXPLAINED,
     LEAST_EXCESS,
     LEAST_GAIN,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
+    MUCH_LEFT,
     NEARLY_EXPLAINED,
     NOISE_RENEWED,
     OVERSTATED_NOISE,
@@ -43,6 +42,7 @@ from rsea_core.identify.whole_runs.nearly_complete import (
 from rsea_core.identify.whole_runs.parameters_alone import parameters_alone
 from rsea_core.identify.whole_runs.search import WholeSearch, begun_with_rival, explained_once
 from rsea_core.identify.whole_runs.sensor_noise import (
+    complete_below,
     converged,
     excess,
     in_noise_left_by,
@@ -93,7 +93,7 @@ def laws_added(
         if not search.taken or search.left() > OVERSTATED_NOISE:
             break
         say(f"whole recordings: laws leave {search.left():.2f}: again in the noise that they leave")
-        own = in_noise_left_by(search.own, search.fit)
+        own = in_noise_left_by(search.own, search.fit, apart=True)
         found, search = _laws_added(found, own, say, None, effects)
     return found, search
 
@@ -114,7 +114,7 @@ def _laws_added(
     found = replace(found, excess=excess(own, plain.hypothesis, plain.x))
     say(f"whole recordings: these errors cost {found.excess:.0f} units more than noise")
     laws = [w for w in laws_of(found) if effects is None or w.effect in effects]
-    search = WholeSearch(own, plain, found, laws, _enough(left))
+    search = WholeSearch(own, plain, found, laws, complete_below(left))
     if known is not None and known.begins_like(search):
         known.found = found
         return found, known
@@ -124,6 +124,9 @@ def _laws_added(
         all_taken = effects is not None and effects <= {law.effect for law in search.taken}
         if search.left() <= search.enough or all_taken or not search.add(say):
             break
+        if found.unpredicted and search.left() > MUCH_LEFT * left:
+            say("whole recordings: nothing predicts them; no further law is added")
+            return found, search
         search.prune(say)
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
@@ -333,7 +336,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
     say(f"whole recordings: what windows showed leaves {left:.2f}")
     if far_from_rig(found.problem, found.best.x):
         found, fit, left = _closer_to_rig(found, own, fit, say)
-    enough = _enough(found.left_by_parameters)
+    enough = complete_below(found.left_by_parameters)
     if left <= enough:
         found, fit = without_redundant(found, own, fit, enough, say)
     if left > enough or not all(
@@ -391,9 +394,3 @@ def _with_shape(found: Found, own: Estimator, say) -> Found:
     if share < max(SHAPE_SHARE, found.explained_once):  # a torque that acts once explains more
         return found
     return replace(found, base_shapes=[best, *found.base_shapes])
-
-
-def _enough(left: float) -> float:
-    """Misfit below which laws are complete, by what parameters alone leave."""
-    most = float(np.sqrt(1.0 + (1.0 - EXPLAINED) * max(left**2 - 1.0, 0.0)))
-    return max(min(COMPLETE, most), COMPLETE_SHARE * left)

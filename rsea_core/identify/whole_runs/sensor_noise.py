@@ -17,6 +17,9 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_fits import at_bound
 from rsea_core.identify.multistep.criteria import (
+    COMPLETE,
+    COMPLETE_SHARE,
+    EXPLAINED,
     LEAST_GAIN,
     NEGLIGIBLE_FALL,
     SCANS,
@@ -30,6 +33,7 @@ from rsea_core.identify.multistep.tracks import Track, from_rest, prepared
 from rsea_core.identify.smoothing.encoder_quantisation import UNIFORM, changes_by_counts, count_of
 
 DECORRELATED = 5.0  # time constants after which coloured noise is taken for uncorrelated
+LARGEST_NOISE = 10.0  # of what fourth differences of a reading show: coloured noise has more
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
 STEPS = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
 MOVES = np.concatenate([-STEPS[::-1], [0.0], STEPS])
@@ -72,14 +76,19 @@ def _with_limited_noise(own: Estimator, fit: Estimate) -> list[Track]:
     """Tracks whose readings have no more noise than differences of a fit's errors show.
 
     Noise that was estimated without a law that the machine has includes the model's error; a drift
-    can exceed the sensor's noise many times.
+    can exceed the sensor's noise many times. Where no values predict the machine, their errors are
+    no limit, and the readings' own changes are one.
     """
     tracks = []
     for t, r in zip(own.tracks, own.residuals([(fit.hypothesis, fit.x)]), strict=True):
         row_s = t.block * t.experiment.recording.sample_time_s
         lag = max(round(DECORRELATED * t.noise.colour_time_s / row_s), 1) if _of_sensor(t) else 1
         least = np.maximum(t.experiment.floor_of_each / t.block**0.5, _quantisation(t))
-        most = np.maximum(std_of_differences(t.averaged(r[0]), lag), least)
+        most = np.minimum(
+            std_of_differences(t.averaged(r[0]), lag),
+            LARGEST_NOISE * std_beside_motion(t.averaged(t.experiment.measured)),
+        )
+        most = np.maximum(most, least)
         if np.all(np.isfinite(most)):
             t = prepared(t, noise=replace(t.noise, readings=np.minimum(t.noise.readings, most)))
         tracks.append(t)
@@ -93,6 +102,15 @@ def std_of_differences(errors: NDArray, lag: int) -> NDArray:
     Math. Stat. 12 (1941) 153, at a lag of one row); slower errors of the model cancel.
     """
     return np.std(errors[lag:] - errors[:-lag], axis=0) / 2.0**0.5
+
+
+def std_beside_motion(readings: NDArray) -> NDArray:
+    """Standard deviations (p,) of readings (n, p) beside a motion that is smooth over five rows.
+
+    Of fourth differences, in which white noise of unit deviation has sqrt(70) and a cubic nothing:
+    an upper limit of white noise; of noise with a time constant of r rows they see about r^-1/2.
+    """
+    return np.std(np.diff(readings, 4, axis=0), axis=0) / 70.0**0.5
 
 
 def _quantisation(t: Track) -> NDArray:
@@ -119,20 +137,26 @@ def is_coloured(estimator: Estimator) -> bool:
     )
 
 
-def in_noise_left_by(own: Estimator, fit: Estimate) -> Estimator:
+def in_noise_left_by(own: Estimator, fit: Estimate, *, apart: bool = False) -> Estimator:
     """Another estimator, the noise of each reading as large as the errors that a fit leaves.
 
     Noise that was estimated while a law was missing includes the error that this law explains. It
     is no less than that of the counts.
+
+    Parameters
+    ----------
+    apart : bool
+        The noise of each recording is what is left of it; else the ratio of noises stays.
     """
-    left: dict[str, list[float]] = {}
-    for t, e in zip(own.tracks, own.innovations([(fit.hypothesis, fit.x)]), strict=True):
-        sizes = np.sqrt(np.mean(huber_squares(e[0]), axis=0))
-        for name, size in zip(t.experiment.channels, sizes, strict=True):
-            left.setdefault(name, []).append(float(size))
+    found = own.innovations([(fit.hypothesis, fit.x)])
+    sizes = [np.sqrt(np.mean(huber_squares(e[0]), axis=0)) for e in found]
+    largest: dict[str, float] = {}
+    for t, size in zip(own.tracks, sizes, strict=True):
+        for name, each in zip(t.experiment.channels, size, strict=True):
+            largest[name] = max(largest.get(name, 0.0), float(each))
     tracks = []
-    for t in own.tracks:
-        share = np.array([max(left[name]) for name in t.experiment.channels])
+    for t, size in zip(own.tracks, sizes, strict=True):
+        share = size if apart else np.array([largest[name] for name in t.experiment.channels])
         least = np.minimum(t.experiment.floor_of_each / t.block**0.5, t.noise.readings)
         readings = np.maximum(share * t.noise.readings, least)
         tracks.append(prepared(t, noise=replace(t.noise, readings=readings)))
@@ -238,3 +262,9 @@ def excess(own: Estimator, h: Hypothesis, x: NDArray) -> float:
     """Cost of the errors beyond that of the noise, in units; 0 where noise alone costs as much."""
     found = own.innovations([(h, x)])
     return max(sum(0.5 * float(np.sum(huber_squares(e) - 1.0)) for e in found), 0.0)
+
+
+def complete_below(left: float) -> float:
+    """Misfit below which laws are complete, by what parameters alone leave."""
+    most = float(np.sqrt(1.0 + (1.0 - EXPLAINED) * max(left**2 - 1.0, 0.0)))
+    return max(min(COMPLETE, most), COMPLETE_SHARE * left)

@@ -10,6 +10,7 @@ import pytest
 from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import (
     as_effect,
@@ -24,7 +25,7 @@ from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.whole_runs.complete import confirmed_by_whole_runs
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
-from rsea_core.recordings.case import read_case
+from rsea_core.recordings.case import Case, read_case
 
 ROW_s, ROWS, FINER = 2e-3, 1500, 200
 RATIO, MOTOR, LOAD, DAMPING = 50.0, 4e-3, 3e-3, 8e-3  # both inertias at the output, kgm2, Nms/rad
@@ -51,7 +52,7 @@ load = "free"
 """
 
 
-def simulated(width: float) -> np.ndarray:
+def simulated(width: float, dead_zone: float = 0.0) -> np.ndarray:
     """Duty and true angles of motor and load (n, 3): two bodies, teeth with a damper, by hand."""
     time = np.arange(ROWS) * ROW_s
     duty = 0.3 * np.sin(2 * np.pi * 0.7 * time) + 0.2 * np.sin(2 * np.pi * 1.9 * time + 1.0)
@@ -67,28 +68,30 @@ def simulated(width: float) -> np.ndarray:
             teeth = math.copysign(max(stiff * beyond, 0.0), twist) + (
                 drag * rate if beyond else 0.0
             )
-            current = (u * VOLTS - CONSTANT * RATIO * motor_speed) / OHM
+            acting = math.copysign(max(abs(u) - dead_zone, 0.0), u)
+            current = (acting * VOLTS - CONSTANT * RATIO * motor_speed) / OHM
             motor_speed += h * (CONSTANT * RATIO * current - DAMPING * motor_speed - teeth) / MOTOR
             load_speed += h * (teeth - 1e-4 * load_speed) / LOAD
             motor, load = motor + h * motor_speed, load + h * load_speed
     return out
 
 
+def recorded(folder, width: float, dead_zone: float = 0.0) -> Case:
+    """The case of a train, read by counts."""
+    duty, motor, load = simulated(width, dead_zone).T
+    steps = 2 * np.pi / np.array([2048, 4096])
+    read = np.round(np.stack([motor, load], axis=1) / steps + 0.3) * steps
+    table = np.column_stack([np.arange(ROWS) * ROW_s, duty, read])
+    names = "time_s,duty,motor_angle_rad,load_angle_rad"
+    np.savetxt(folder / "a.csv", table, delimiter=",", header=names, comments="")
+    (folder / "rig.toml").write_text(RIG)
+    return read_case(folder)
+
+
 @pytest.fixture(scope="module")
 def cases(tmp_path_factory):
     """The train with backlash, and without."""
-    found = {}
-    for width in (WIDTH, 0.0):
-        folder = tmp_path_factory.mktemp("train")
-        duty, motor, load = simulated(width).T
-        steps = 2 * np.pi / np.array([2048, 4096])
-        read = np.round(np.stack([motor, load], axis=1) / steps + 0.3) * steps
-        table = np.column_stack([np.arange(ROWS) * ROW_s, duty, read])
-        names = "time_s,duty,motor_angle_rad,load_angle_rad"
-        np.savetxt(folder / "a.csv", table, delimiter=",", header=names, comments="")
-        (folder / "rig.toml").write_text(RIG)
-        found[width] = read_case(folder)
-    return found
+    return {width: recorded(tmp_path_factory.mktemp("train"), width) for width in (WIDTH, 0.0)}
 
 
 def silent(_text):
@@ -167,6 +170,17 @@ def test_backlash_before_the_mesh_predicts_what_no_rigid_train_does(cases):
     assert fit.cost < whole.base.cost - 500.0  # units of log-likelihood, beside the elastic mesh
     # a rigid train errs by that wherever the load stands in its play (uniform distribution)
     assert error(whole.estimator, h, fit.x) < WIDTH / math.sqrt(12.0) < before
+
+
+def test_backlash_is_found_beside_a_dead_zone_that_explains_nearly_all(tmp_path):
+    """The dead zone moves both angles by far more than the play between them."""
+    found = investigate(recorded(tmp_path, WIDTH, dead_zone=0.06))
+    assert {step.law.effect for step in found.steps} == {"drive-dead-zone", "gear-backlash"}
+    values = found.problem.values(found.best.hypothesis, found.best.x)[1]
+    (zone,) = [v["width_duty"] for v in values if "width_duty" in v]
+    (width,) = [v["width_rad"] for v in values if "width_rad" in v]
+    assert zone == pytest.approx(0.06, rel=0.03)
+    assert width == pytest.approx(WIDTH, rel=0.15)
 
 
 def test_the_error_of_a_rigid_train_is_taken_at_the_motors_angle_as_read(cases):

@@ -1,0 +1,38 @@
+"""Values that leave much of the torque unknown explain nothing, whatever they are."""
+
+import numpy as np
+import pytest
+
+from rsea_core.engines.fixed_step.replay import Replay
+from rsea_core.identify.window_diagnosis import diagnose_windows
+from rsea_core.machine.inputs import Inputs, Load
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.recordings.recording import Recording
+from tests.cases.one_axis import ROW_s, axis_case, axis_rig
+
+
+def shaken_recording(seed: int, share: float) -> Recording:
+    """An axis on which random torques act that the log does not have.
+
+    share : of their standard deviation over the command's amplitude
+    """
+    rng = np.random.default_rng(seed)
+    time = ROW_s * np.arange(1200)
+    command = 1.2 * np.sin(2.0 * np.pi * 0.8 * time + rng.uniform(0.0, 6.0))
+    unlogged = 1.2 * share * rng.standard_normal(time.size)
+    inputs = Inputs(time_s=time, current_command_A=command + unlogged, load=Load(kind="free"))
+    angle = Replay.of(inputs, step_s=2e-3).run(ActuatorModel(axis_rig()))[:, 0]
+    read = angle + 1e-4 * rng.standard_normal(time.size)
+    columns = {"time_s": time, "current_command_A": command, "motor_angle_rad": read}
+    return Recording(file=f"shaken{seed}.csv", role="identification", load=Load(kind="free"),
+                     columns=columns, sample_time_s=ROW_s)  # fmt: skip
+
+
+@pytest.mark.parametrize(("share", "verdict"), [(3.0, "unexplained"), (0.0, "no-mismatch")])
+def test_random_torques_as_large_as_the_command_are_no_matter_of_values(tmp_path, share, verdict):
+    made = [shaken_recording(seed, share) for seed in (1, 2)]
+    found = diagnose_windows(axis_case(tmp_path, *made, rig=axis_rig()), quick=True).document
+    assert found["verdict"] == verdict
+    if verdict == "unexplained":
+        assert "leave an unknown torque" in found["remainder"]["words"]
+        assert "of the usual torque" in found["remainder"]["words"]
