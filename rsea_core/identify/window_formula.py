@@ -182,8 +182,8 @@ def inertia_of(
     """
     projection = Projection(found.base_estimator, found.base)
     places = [port for port in ports(found.base_estimator.tracks[0]) if port in STATES]
-    waves = [varying_inertia(projection, found.base, port) for port in places]
-    best = max(filter(None, waves), key=lambda w: w.held_out, default=None)
+    trials = [varying_inertia(projection, found.base, port) for port in places]
+    best = max(filter(None, trials), key=lambda w: w.held_out, default=None)
     if best is None:
         return None
     say(f"  {best.sentence()}: held-out gain {best.held_out:.1f} +- {best.deviation:.1f}")

@@ -18,7 +18,7 @@ from rsea_core.identify.law_search.shape_search import response
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.tracks import Track
 
-WAVES = (1, 2)  # in a turn
+CYCLES = (1, 2)  # in a turn
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,7 +27,7 @@ class VaryingInertia:
 
     Attributes
     ----------
-    waves : int
+    cycles : int
         In a turn.
     cosine_kgm2, sine_kgm2 : float
     share : float
@@ -40,7 +40,7 @@ class VaryingInertia:
         Parameters alone.
     """
 
-    waves: int
+    cycles: int
     cosine_kgm2: float
     sine_kgm2: float
     share: float
@@ -56,10 +56,12 @@ class VaryingInertia:
 
     def text(self) -> str:
         """The inertia as a formula."""
-        wave = "theta" if self.waves == 1 else f"{self.waves} theta"
+        wave = "theta" if self.cycles == 1 else f"{self.cycles} theta"
+        sign = "-" if self.sine_kgm2 < 0.0 else "+"
         return (
-            f"J = J0 + {self.cosine_kgm2:.3g} cos({wave}) + {self.sine_kgm2:.3g} sin({wave}) kgm2,"
-            f" {100.0 * self.share:.0f} % of J0, a torque of J alpha + J' omega^2 / 2"
+            f"J = J0 + ({self.cosine_kgm2:.3g} cos({wave}) {sign} {abs(self.sine_kgm2):.3g}"
+            f" sin({wave})) kgm2, {100.0 * self.share:.0f} % of J0: a torque of J alpha"
+            " + J' omega^2 / 2"
         )
 
     def report(self) -> dict:
@@ -67,8 +69,8 @@ class VaryingInertia:
         return {
             "words": self.text(),
             "terms": [
-                {"function": f"cos({self.waves} theta)", "coefficient_kgm2": self.cosine_kgm2},
-                {"function": f"sin({self.waves} theta)", "coefficient_kgm2": self.sine_kgm2},
+                {"function": f"cos({self.cycles} theta)", "coefficient_kgm2": self.cosine_kgm2},
+                {"function": f"sin({self.cycles} theta)", "coefficient_kgm2": self.sine_kgm2},
             ],
         }
 
@@ -89,19 +91,19 @@ def varying_inertia(projection: Projection, base: Estimate, port: str) -> Varyin
     moved = plant.load_inertia if port == "L" else plant.inertia + rigid * plant.load_inertia
     columns = [
         [response(t, port, torque) for t, torque in zip(tracks, torques, strict=True)]
-        for waves in WAVES
-        for torques in zip(*(_torques(t, port, waves) for t in tracks), strict=True)
+        for cycles in CYCLES
+        for torques in zip(*(_torques(t, port, cycles) for t in tracks), strict=True)
     ]
     blocks, seen = blocks_of_columns(projection, columns)
     found = []
-    for place, waves in enumerate(WAVES):
+    for place, cycles in enumerate(CYCLES):
         pair = [2 * place, 2 * place + 1]
         if set(pair) <= set(seen):
             a, b = blocks.solved(pair, np.arange(len(blocks.xy)))
             held_out, deviation = blocks.held_out(pair)
             found.append(
                 VaryingInertia(
-                    waves=waves, cosine_kgm2=float(a), sine_kgm2=float(b), held_out=held_out,
+                    cycles=cycles, cosine_kgm2=float(a), sine_kgm2=float(b), held_out=held_out,
                     deviation=deviation, share=float(np.hypot(a, b)) / moved,
                     side="load" if rigid or port == "L" else "gear",
                     estimator=projection.estimator, fit=base,
@@ -110,13 +112,13 @@ def varying_inertia(projection: Projection, base: Estimate, port: str) -> Varyin
     return max(found, key=lambda f: f.held_out, default=None)
 
 
-def _torques(t: Track, port: str, waves: int) -> tuple[NDArray, NDArray]:
+def _torques(t: Track, port: str, cycles: int) -> tuple[NDArray, NDArray]:
     """What a unit wave of the inertia, as cosine and as sine, takes from the body (n,) [Nm]."""
     angle, speed = (t.motion[:, at] for at in STATES[port])
     row_s = t.experiment.recording.sample_time_s
     acceleration = np.gradient(speed, row_s)
-    turned = waves * angle
-    half = 0.5 * waves * speed**2
+    turned = cycles * angle
+    half = 0.5 * cycles * speed**2
     return (
         -(np.cos(turned) * acceleration - half * np.sin(turned)),
         -(np.sin(turned) * acceleration + half * np.cos(turned)),

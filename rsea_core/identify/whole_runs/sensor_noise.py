@@ -86,7 +86,7 @@ def _with_limited_noise(own: Estimator, fit: Estimate) -> list[Track]:
         least = np.maximum(t.experiment.floor_of_each / t.block**0.5, _quantisation(t))
         most = np.minimum(
             std_of_differences(t.averaged(r[0]), lag),
-            LARGEST_NOISE * std_beside_motion(t.averaged(t.experiment.measured)),
+            LARGEST_NOISE * std_of_fourth_differences(t.averaged(t.experiment.measured)),
         )
         most = np.maximum(most, least)
         if np.all(np.isfinite(most)):
@@ -104,7 +104,7 @@ def std_of_differences(errors: NDArray, lag: int) -> NDArray:
     return np.std(errors[lag:] - errors[:-lag], axis=0) / 2.0**0.5
 
 
-def std_beside_motion(readings: NDArray) -> NDArray:
+def std_of_fourth_differences(readings: NDArray) -> NDArray:
     """Standard deviations (p,) of readings (n, p) beside a motion that is smooth over five rows.
 
     Of fourth differences, in which white noise of unit deviation has sqrt(70) and a cubic nothing:

@@ -172,7 +172,7 @@ def test_backlash_before_the_mesh_predicts_what_no_rigid_train_does(cases):
     assert error(whole.estimator, h, fit.x) < WIDTH / math.sqrt(12.0) < before
 
 
-def test_backlash_is_found_beside_a_dead_zone_that_explains_nearly_all(tmp_path):
+def test_backlash_is_found_with_a_dead_zone_that_explains_nearly_all(tmp_path):
     """The dead zone moves both angles by far more than the play between them."""
     found = investigate(recorded(tmp_path, WIDTH, dead_zone=0.06))
     assert {step.law.effect for step in found.steps} == {"drive-dead-zone", "gear-backlash"}
