@@ -53,9 +53,12 @@ def _listed(file: Path) -> list[str]:
 
 
 def _seconds_of_files() -> Counter[str]:
-    """CPU seconds of each file's slow tests."""
+    """CPU seconds of each file's slow tests, without long ones."""
     found: Counter[str] = Counter()
+    long = set(long_tests())
     for seconds, test in _rows(SLOW_TESTS):
+        if test in long:
+            continue
         found[test.partition("::")[0]] += float(seconds)
     return found
 
