@@ -52,7 +52,7 @@ class VaryingInertia:
 
     def sentence(self) -> str:
         """What it is, with its size."""
-        return f"an inertia that varies with the angle; {self.text()}"
+        return f"an inertia that varies with the angle theta; {self.text()}"
 
     def text(self) -> str:
         """The inertia as a formula."""
