@@ -20,6 +20,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     in_sensor_noise,
     misfit,
     std_of_differences,
+    std_of_fourth_differences,
 )
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -78,3 +79,12 @@ def test_noise_estimated_too_large_is_limited_to_the_sensors_noise_with_and_with
     fit = estimator.fit(h, problem.start(h))
     (track,) = in_sensor_noise(estimator.having(loud), fit).tracks
     assert track.noise.readings[0] * track.block**0.5 == pytest.approx(size, rel=0.2)
+
+
+@pytest.mark.parametrize("size", [1e-4, 1e-2])
+def test_fourth_differences_show_the_noise_of_a_reading_and_not_its_motion(size):
+    rows = np.arange(20_000)
+    motion = 30.0 * np.sin(2.0 * np.pi * rows / 400.0) + 1e-3 * rows  # 2e-7 rad of it is left
+    noise = np.random.default_rng(9).normal(0.0, size, rows.size)
+    found = std_of_fourth_differences((motion + noise)[:, None])
+    np.testing.assert_allclose(found, size, rtol=0.05)  # six standard errors of 20,000 rows
