@@ -33,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_pdf(parser)
     speed = parser.add_mutually_exclusive_group()
     speed.add_argument(
-        "--quick", action="store_true", help="fewer fits on coarser samples, brief report"
+        "--quick", action="store_true", help="fewer fits of fewer rows, brief report"
     )
     speed.add_argument("--thorough", action="store_true", help="finer steps, no early stopping")
     parser.add_argument("--json", action="store_true", help="print the diagnosis as JSON")

@@ -43,7 +43,11 @@ from rsea_core.identify.whole_runs.complete import (
     with_whole_runs,
 )
 from rsea_core.identify.whole_runs.parameters_alone import found_sound
-from rsea_core.identify.whole_runs.sensor_noise import misfit, refitted_from_rig
+from rsea_core.identify.whole_runs.sensor_noise import (
+    in_noise_left_by,
+    misfit,
+    refitted_from_rig,
+)
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
 from rsea_core.recordings.case import Case
 
@@ -150,7 +154,9 @@ def _with_gear_mesh_in_whole_runs(case: Case, nearly: Found, say) -> Found:
 
     The laws given stand where backlash in an elastic mesh explains little of what they leave.
     """
-    elastic = with_gear_mesh(case) if encoders_disagree(nearly) else None
+    left_noise = in_noise_left_by(nearly.estimator, nearly.best, apart=True)
+    disagree = encoders_disagree(replace(nearly, estimator=left_noise))
+    elastic = with_gear_mesh(case) if disagree else None
     if elastic is None:
         return nearly
     say("whole recordings: the encoders of a rigid train disagree; now with an elastic gear mesh")

@@ -24,7 +24,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
 
-BRIEF_ROWS = 2500  # of all recordings fitted
+BRIEF_ROWS, BRIEF_ROWS_OF_EACH = 2500, 250  # fitted: of all recordings, or more of many
 QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
@@ -49,7 +49,8 @@ def diagnose_windows(
     case, clamps = with_yielding_clamps(case)
     cut: tuple[Finding, ...] = ()
     if quick:
-        case, cut = truncate(case, np.inf, BRIEF_ROWS, instead="without --quick all of it is")
+        most = max(BRIEF_ROWS, BRIEF_ROWS_OF_EACH * len(case.identification))
+        case, cut = truncate(case, np.inf, most, reason="without --quick all rows are")
     conclusion = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
     findings = [*cut, *([QUICK_LOOK] if quick else [])] + [
         Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps

@@ -23,6 +23,7 @@ from rsea_core.identify.multistep.criteria import (
     RIVAL_SHARE,
     TIMING_DOUBT,
     UNBELIEVED,
+    UNKNOWN_MOST,
     UNKNOWN_SHARE,
     WITHIN_ROW,
 )
@@ -176,9 +177,13 @@ def unknown_torque(estimator: Estimator, error: float) -> str | None:
     )
 
 
-def unknown_share(estimator: Estimator) -> float:
-    """That torque over the usual one, of the recording with the largest share."""
-    return _largest_unknown_torque(estimator)[0]
+def leaves_much_torque(estimator: Estimator) -> bool:
+    """Whether that torque is so large that values of the rig explain no recording.
+
+    Commands that a log holds smoothed cause an unknown torque themselves.
+    """
+    smooth = estimator.problem.timing.smooth
+    return not smooth and _largest_unknown_torque(estimator)[0] > UNKNOWN_MOST
 
 
 def _largest_unknown_torque(estimator: Estimator) -> tuple[float, float, float]:

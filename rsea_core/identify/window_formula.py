@@ -28,11 +28,9 @@ from rsea_core.identify.multistep.criteria import (
     INERTIA_RATIO,
     KEPT_RATIO,
     LEAST_GAIN,
-    LEAST_RATIO,
     PER_VALUE,
     SHAPE_GAIN,
     SHAPE_RATIO,
-    UNEVEN_GAIN,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.window_fit import fit_of, spread_of
@@ -176,10 +174,13 @@ def unnamed_formula(
 def inertia_of(
     found: Found, shape: Shape | None, say: Callable[[str], None] = lambda _: None
 ) -> VaryingInertia | None:
-    """An inertia that varies with the angle; None where a shape says as much, or none is seen.
+    """An inertia that varies with the angle; None where a shape gains as much, or none is seen.
 
-    It gains where the motion is fast: the gain is less even than that of a torque.
+    It gains where the motion is fast: the gain is less even than that of a torque. A linear axis
+    has no turn.
     """
+    if found.problem.case.rig.axis == "linear":
+        return None
     projection = Projection(found.base_estimator, found.base)
     places = [port for port in ports(found.base_estimator.tracks[0]) if port in STATES]
     trials = [varying_inertia(projection, found.base, port) for port in places]
@@ -272,8 +273,7 @@ def formula_of(
     sizes = zip(chosen.coefficients, chosen.terms, strict=True)
     text = " + ".join(f"{size:.3g} {term.text()}" for size, term in sizes)
     say(f"  formula {text}: held-out gain {chosen.held_out:.1f} +- {chosen.deviation:.1f}")
-    ratio = LEAST_RATIO if chosen.held_out > UNEVEN_GAIN else SHAPE_RATIO
-    least = max(SHAPE_GAIN, ratio * chosen.deviation)
+    least = max(SHAPE_GAIN, SHAPE_RATIO * chosen.deviation)
     if chosen.held_out < max(least, OF_SHAPE * (shape.held_out if shape else 0.0)):
         return None
     return _fitted(found, chosen, shape, say)

@@ -33,7 +33,6 @@ from rsea_core.identify.multistep.criteria import (
     SHAPE_RATIO,
     UNCLAIMED,
     UNEVEN_GAIN,
-    UNKNOWN_MOST,
     WORSE,
 )
 from rsea_core.identify.multistep.horizons import relative_error
@@ -46,10 +45,10 @@ from rsea_core.identify.window_fit import (
     FoundSearch,
     fit_of,
     late_command,
+    leaves_much_torque,
     rungs_of,
     spread_of,
     strained_value,
-    unknown_share,
     unknown_torque,
 )
 from rsea_core.identify.window_formula import (
@@ -95,7 +94,7 @@ class WindowVerdict(Conclusion):
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
         self.dependent &= not found.sound and not self.problem.timing.smooth
-        self.unaccounted = doubted and unknown_share(self.estimator) > UNKNOWN_MOST
+        self.unaccounted = doubted and leaves_much_torque(self.estimator)
         self.reason = _reason_of(self)
         self.verdict = self._verdict()
 

@@ -14,20 +14,23 @@ from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 MOST_STEPS, MOST_STEPS_QUICK = 60_000, 30_000  # of one replay of all fitted recordings
-WHOLE = "--thorough takes all of it"
+LONG = (
+    "all recordings together are longer than a diagnosis can replay in its time (--thorough takes"
+    " all of it)"
+)
 
 
 def truncate(
-    case: Case, step_s: float, most: int, *, instead: str = WHOLE
+    case: Case, step_s: float, most: int, *, reason: str = LONG
 ) -> tuple[Case, tuple[Finding, ...]]:
     """The case with at most so many steps in a replay of its identification recordings.
 
     Parameters
     ----------
     step_s : float
-        Longest step of a replay; every row takes one at least.
-    instead : str
-        How all of it is fitted.
+        Longest step of a replay; every row takes one at least, and with inf no more.
+    reason : str
+        What the findings state.
 
     Returns
     -------
@@ -49,8 +52,7 @@ def truncate(
         kept.append(_first(r, rows))
         text = (
             f"only its first {rows * r.sample_time_s:.4g} s of"
-            f" {r.rows * r.sample_time_s:.4g} s were fitted: all recordings together are longer"
-            f" than a diagnosis can replay in its time ({instead})"
+            f" {r.rows * r.sample_time_s:.4g} s were fitted: {reason}"
         )
         findings.append(Finding(kind=Kind.TRUNCATED, text=text, file=r.file))
     return replace(case, recordings=tuple(kept)), tuple(findings)

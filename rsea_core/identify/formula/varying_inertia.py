@@ -52,7 +52,7 @@ class VaryingInertia:
 
     def sentence(self) -> str:
         """What it is, with its size."""
-        return f"an inertia that varies with the angle theta; {self.text()}"
+        return f"an inertia that varies with the angle theta: {self.text()}"
 
     def text(self) -> str:
         """The inertia as a formula."""
@@ -60,8 +60,8 @@ class VaryingInertia:
         sign = "-" if self.sine_kgm2 < 0.0 else "+"
         return (
             f"J = J0 + ({self.cosine_kgm2:.3g} cos({wave}) {sign} {abs(self.sine_kgm2):.3g}"
-            f" sin({wave})) kgm2, {100.0 * self.share:.0f} % of J0: a torque of J alpha"
-            " + J' omega^2 / 2"
+            f" sin({wave})) kgm2, an amplitude of {100.0 * self.share:.0f} % of J0; it needs the"
+            " torque J alpha + J' omega^2 / 2"
         )
 
     def report(self) -> dict:

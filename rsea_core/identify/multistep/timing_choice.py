@@ -66,7 +66,7 @@ def first_growth(
         return first
     better = in_better_timing(first, case, say)
     timing = better[0].problem.timing
-    if timing == AS_LOGGED or quick:
+    if timing == AS_LOGGED:
         return better
     problem = MultistepProblem(case, timing=timing, steps=better[0].problem.steps)
     again = parameters(problem, h, say)  # grown with this timing

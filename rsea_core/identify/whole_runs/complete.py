@@ -125,7 +125,7 @@ def _laws_added(
         if search.left() <= search.enough or all_taken or not search.add(say):
             break
         if found.unpredicted and search.left() > MUCH_LEFT * left:
-            say("whole recordings: nothing predicts them; no further law is added")
+            say("whole recordings: no law predicts them; no further one is added")
             return found, search
         search.prune(say)
         other = with_single_zeros(found, own, search.fit, say)

@@ -29,7 +29,7 @@ def shaken_recording(seed: int, share: float) -> Recording:
 
 
 @pytest.mark.parametrize(("share", "verdict"), [(3.0, "unexplained"), (0.0, "no-mismatch")])
-def test_random_torques_as_large_as_the_command_are_no_matter_of_values(tmp_path, share, verdict):
+def test_values_of_the_rig_do_not_explain_large_random_torques(tmp_path, share, verdict):
     made = [shaken_recording(seed, share) for seed in (1, 2)]
     found = diagnose_windows(axis_case(tmp_path, *made, rig=axis_rig()), quick=True).document
     assert found["verdict"] == verdict
