@@ -36,8 +36,10 @@ from rsea_core.identify.multistep.timing_choice import (
     with_better_timing,
 )
 from rsea_core.identify.whole_runs.complete import (
+    begins_no_better,
     concluded,
     confirmed_by_whole_runs,
+    in_other_timing,
     laws_added,
     of_first_growth,
     with_whole_runs,
@@ -105,12 +107,20 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
         return with_whole_runs(from_growth(first, say), say)
     better = in_better_timing(first, case, say)
     found, search = laws_added(from_growth(better, say), say)
-    end, doubted = of_first_growth(found, search, say)
+    end, timing, doubted = of_first_growth(found, search, say)
     if end is not None and not doubted:
         return end, None
-    finished = search.left() <= search.enough
+    if timing is not None:
+        say("searched again: with what whole recordings show, commands act at other times")
+        other, _ = in_other_timing(search, timing, say)
+        if other.complete or other.sound:
+            return other, None
     again = from_growth(grown_again(first, case, say), say)
-    found, nearly = concluded(*laws_added(again, say, known=None if finished else search), say)
+    if search.left() > search.enough and begins_no_better(search, again):
+        say("whole recordings: no likelier so; the laws added before stand")
+        found, nearly = concluded(found, search, say)
+        return (found if found.complete or found.sound else found.in_windows_of(again)), nearly
+    found, nearly = concluded(*laws_added(again, say), say)
     if end is not None and end.complete and not (found.complete or found.sound):
         say("whole recordings: the laws of the first growth of windows are complete")
         return end, None

@@ -53,7 +53,7 @@ from rsea_core.identify.multistep.tracks import prepared
 def fitted(
     estimator: Estimator, base: Estimate, c: Candidate, short: Estimator | None = None, *,
     factors: Sequence[float] = (1.0, 0.5), iterations: int = 8,
-    target_cost: float = np.inf,
+    target_cost: float = np.inf, shared: Sequence[NDArray] | None = None,
 ) -> Estimate:  # fmt: skip
     """A candidate fitted from its best size, beside what is fitted already.
 
@@ -65,6 +65,8 @@ def fitted(
         Of the size that the screening saw: starts, beside its own.
     target_cost : float
         Cost that the fit must reach to be of use (`Estimator.fit`).
+    shared : sequence of arrays or None
+        Derivatives by the unknowns of the fit beside which it is fitted.
     """
     problem = estimator.problem
     h = Hypothesis(laws=(*base.hypothesis.laws, c.law))
@@ -81,7 +83,8 @@ def fitted(
         trials.append((h, begun.x))
     costs = estimator.costs(trials)
     begin = trials[int(np.argmin(costs))][1]
-    return estimator.fit(h, begin, iterations=iterations, target_cost=target_cost)
+    shared = shared if others is base.x else None
+    return estimator.fit(h, begin, iterations=iterations, target_cost=target_cost, shared=shared)
 
 
 def settled(

@@ -123,6 +123,14 @@ class Found:
     complete: bool = False
     explained: float = 1.0
 
+    def in_windows_of(self, other: "Found") -> "Found":
+        """Another growth of windows, with what whole recordings showed in this one."""
+        return replace(
+            other, left_by_parameters=self.left_by_parameters, excess=self.excess,
+            explained_once=self.explained_once, sound_below=self.sound_below,
+            by_whole_runs=self.by_whole_runs,
+        )  # fmt: skip
+
     @property
     def sound(self) -> bool:
         """Whether parameters alone predict whole recordings to the sensors' noise."""

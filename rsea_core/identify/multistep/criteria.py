@@ -124,6 +124,7 @@ MANY_STARTS = 20  # of a law: the one that windows show is a start too
 ORDERS = 2  # cycles of cogging in a turn, likeliest along the recorded motion: tried
 QUICK_ITERATIONS, CLOSE_TO_BEST = 3, 0.5  # of laws that a screening puts last; of the best gain
 CLOSE_FIRST, FIRST_RIVALS = 0.9, 2  # share of the first law's gain; rivals tried first
+SHORTLISTED = 0.1  # of the best gain: laws that are tried again where commands act at other times
 LEAST_OF_BEST = 0.25  # of the best gain so far: a fit that cannot gain this is not continued
 COARSE_STEPS = (12.5, 25.0)  # per fastest cycle, of undivided rows: candidates are compared first
 COARSE_SHARE = 0.1  # of the misfit, that these may change

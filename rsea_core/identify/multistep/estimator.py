@@ -162,8 +162,9 @@ class Estimator:
         return np.where(np.isfinite(total), total, np.inf)
 
     def jacobian(
-        self, h: Hypothesis, x: NDArray, *, fine: bool = False
-    ) -> tuple[list[NDArray], list[NDArray]]:
+        self, h: Hypothesis, x: NDArray, *, fine: bool = False,
+        shared: Sequence[NDArray] | None = None,
+    ) -> tuple[list[NDArray], list[NDArray]]:  # fmt: skip
         """Innovations (n, p) and their derivatives (u, n, p) of each recording.
 
         Forward differences err by their step. Where readings are so good that this is much of
@@ -176,16 +177,20 @@ class Estimator:
         fine : bool
             Much shorter steps, for directions that no reading determines: their curvature is a
             small difference of large ones, and a step's error passes for curvature.
+        shared : sequence of (s, n, p) arrays or None
+            Derivatives by the first s unknowns, taken as they are.
         """
-        _, high = self.problem.bounds(h)
-        names = self.problem.names(h)
+        first = 0 if shared is None else len(shared[0])
+        high = self.problem.bounds(h)[1][first:]
+        names = self.problem.names(h)[first:]
         longest = self.cache.steps
         size = np.minimum(
-            STEP * (1.0 + 0.1 * np.abs(x)), [longest.get(name, np.inf) for name in names]
+            STEP * (1.0 + 0.1 * np.abs(x[first:])), [longest.get(name, np.inf) for name in names]
         )
         size = FINE * size if fine else size
-        steps = np.where(x + size > high, -size, size)
-        trials = [(h, x)] + [(h, x + d) for d in np.diag(steps)]
+        steps = np.where(x[first:] + size > high, -size, size)
+        moves = np.eye(x.size)[first:] * steps[:, None]
+        trials = [(h, x)] + [(h, x + move) for move in moves]
         level, columns = [], []
         for e in self.innovations(trials):
             level.append(e[0])
@@ -197,11 +202,13 @@ class Estimator:
         for name, step in zip(names, allowed, strict=True):
             if not step / ALIKE < longest.get(name, np.inf) < step * ALIKE:
                 longest[name] = step
+        if shared is not None:
+            columns = [np.concatenate(both) for both in zip(shared, columns, strict=True)]
         return level, columns
 
     def fit(
         self, h: Hypothesis, x: NDArray, *, iterations: int = 8, fine: bool = False,
-        target_cost: float = np.inf,
+        target_cost: float = np.inf, shared: Sequence[NDArray] | None = None,
     ) -> Estimate:  # fmt: skip
         """Levenberg-Marquardt from x.
 
@@ -218,14 +225,18 @@ class Estimator:
         target_cost : float
             Cost that the fit must reach to be of use. It ends where a new Jacobian predicts less
             than a third of the decrease that is needed, unless the step is of the greatest length.
+        shared : sequence of (s, n, p) arrays or None
+            Derivatives by the first s unknowns near x, of each recording. As long as steps lower
+            the cost with them, new Jacobians are of the other unknowns only: candidates fitted
+            beside the same base have most unknowns in common.
         """
         low, high = self.problem.bounds(h)
         x = np.clip(x, low, high)
         cost = self.costs([(h, x)])[0]
         damping, arrived, taken = 1e-3, False, 0
         while taken < iterations and np.isfinite(cost) and not arrived:
-            level, columns = self.jacobian(h, x, fine=fine)
-            needed = cost - target_cost
+            level, columns = self.jacobian(h, x, fine=fine, shared=shared)
+            needed, before, own = cost - target_cost, cost, shared is None
             if needed > 0.0 and needed > self._largest_decrease(h, x, level, columns):
                 break
             taken, corrected = taken + 1, 0
@@ -233,14 +244,14 @@ class Estimator:
                 fresh = corrected == 0
                 A, g = self._normal(h, x, level, columns)
                 step, damping = self._best_step(h, x, cost, A, g, damping, fresh)
-                if fresh:
+                if fresh and own:
                     step = self._along_valley(Start(h, x, cost, A, g), level, columns, step)
                 if step is None:
-                    arrived = fresh
+                    arrived = fresh and own
                     break
                 moved, fall = step.x - x, cost - step.cost
                 little = fall < max(0.0 if fine else ENOUGH * abs(cost), NEGLIGIBLE)
-                arrived = fresh and little
+                arrived = fresh and own and little
                 if fresh and fall < NEGLIGIBLE:  # the next fit begins where a Jacobian is known
                     break
                 foreseen = -float(g @ moved + 0.5 * moved @ A @ moved)
@@ -252,6 +263,9 @@ class Estimator:
                     for J, e, after in zip(columns, level, step.innovations, strict=True)
                 ]
                 level, corrected = step.innovations, corrected + 1
+            if not own:
+                little = before - cost < max(ENOUGH * abs(cost), NEGLIGIBLE)
+                shared = None if little else [J[: len(s)] for J, s in zip(columns, shared)]
         centre, weight = self.problem.prior(h)
         prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(

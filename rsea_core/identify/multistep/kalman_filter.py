@@ -14,6 +14,7 @@ from rsea_core.numeric.threads import share_out
 
 LEAST_PIVOT = 1e-9  # of a variance that is left of a reading when others are known
 LANES = 8  # residuals whitened side by side
+SETTLED = 1e-6  # relative change of gains from row to row, below which they stay
 HUBER = 4.0  # innovations beyond so many deviations count linearly
 
 
@@ -135,7 +136,7 @@ def filter_gains(A, Q, mode, C, R, start, begins):
                 for i in range(d):
                     change = max(change, abs(gain[t, i, j] - gain[t - 1, i, j]) * unit)
                     size = max(size, abs(gain[t, i, j]) * unit)
-            settled = change <= 1e-10 * size
+            settled = change <= SETTLED * size
     return gain, root
 
 

@@ -22,7 +22,7 @@ MOST_SLOW = 0.1  # of the rated torque: more is no drift, and dry friction would
 SLOW_INPUT = 3  # of the unknown inputs
 NOISE_STEPS = (3.0, 1.8, 1.3)
 QUIETER = (1.0, 0.1, 0.01)  # unknown torques of the second search's starts, over the first's
-NOISE_BLOCKS, NOISE_LEAST = 4000, 250  # averaged rows that noise is estimated from
+NOISE_BLOCKS, NOISE_LEAST = 2500, 250  # averaged rows that noise is estimated from
 
 
 def estimated_noise(

@@ -170,13 +170,26 @@ def _better_timing(estimator, base, case, timing, say) -> tuple[Estimator, Estim
         hold += f", {timing.fast_share:g} of its fast part"
     gain = base.cost - fit.cost
     say(f"command {hold}, stamps are times of {timing.rows}: {gain:.1f} units likelier")
-    if not better:
-        return estimator, base
-    other = with_noise(other, h, fit.x)
-    fit = other.fit(h, fit.x)
-    smooth(other, h, fit.x)
-    other = with_noise(other.having([prepared(t) for t in other.tracks]), h, fit.x)
-    return other, other.fit(h, fit.x)
+    return _resmoothed(other, fit) if better else (estimator, base)
+
+
+def in_timing(
+    estimator: Estimator, base: Estimate, case: Case, timing: CommandTiming
+) -> tuple[Estimator, Estimate]:
+    """A fit with another timing of the commands, in the same windows."""
+    problem = MultistepProblem(case, timing=timing, steps=estimator.problem.steps)
+    other = with_problem(estimator, problem)
+    return _resmoothed(other, with_best_delay(other, base.hypothesis, base.x))
+
+
+def _resmoothed(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
+    """A fit in its own noise, about the motion that it shows."""
+    h = fit.hypothesis
+    own = with_noise(own, h, fit.x)
+    fit = own.fit(h, fit.x)
+    smooth(own, h, fit.x)
+    own = with_noise(own.having([prepared(t) for t in own.tracks]), h, fit.x)
+    return own, own.fit(h, fit.x)
 
 
 def with_mean_commands(estimator: Estimator, base: Estimate) -> Estimator:

@@ -1,20 +1,20 @@
 """What whole recordings show: complete laws, or one that is nearly all (docs/diagnosis.md 10.4)."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.effects.sensor_delay import SensorDelay
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.law_search.candidate_fits import count_values, far_from_rig
-from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.candidate_fits import far_from_rig
+from rsea_core.identify.law_search.found import Found, from_growth
 from rsea_core.identify.law_search.hold_out import held_out_in_short_windows
-from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.law_search.search import begun, laws_of
-from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.command_timing import CommandTiming, timings
 from rsea_core.identify.multistep.criteria import (
+    ALIKE_EXCESS,
     COMPLETE,
     LEAST_EXCESS,
     LEAST_GAIN,
@@ -24,7 +24,7 @@ from rsea_core.identify.multistep.criteria import (
     NEARLY_EXPLAINED,
     NOISE_RENEWED,
     OVERSTATED_NOISE,
-    SHAPE_SHARE,
+    SAME_END,
     SOUND,
     SOUND_IN_LEFT_NOISE,
     UNPREDICTED,
@@ -33,13 +33,15 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
+from rsea_core.identify.multistep.timing_choice import in_timing
 from rsea_core.identify.whole_runs.nearly_complete import (
+    closer_to_rig,
     complete_by,
     first_law,
     in_own_share,
     nearly_complete,
 )
-from rsea_core.identify.whole_runs.parameters_alone import parameters_alone
+from rsea_core.identify.whole_runs.parameters_alone import parameters_alone, with_shape
 from rsea_core.identify.whole_runs.search import WholeSearch, begun_with_rival, explained_once
 from rsea_core.identify.whole_runs.sensor_noise import (
     complete_below,
@@ -54,13 +56,17 @@ from rsea_core.identify.whole_runs.single_zeros import with_single_zeros
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without, without_redundant
 
 
-def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Found | None]:
+def with_whole_runs(
+    found: Found, say, *, again: bool = True, effects: frozenset[str] | None = None
+) -> tuple[Found, Found | None]:
     """What was found, or the laws that leave nothing but the sensors' noise of whole recordings.
 
     Parameters
     ----------
     again : bool
         Search once more where commands act at other times with laws that are not complete.
+    effects : frozenset of str or None
+        Of the laws tried; None: of all that the case can have.
 
     Returns
     -------
@@ -68,11 +74,11 @@ def with_whole_runs(found: Found, say, *, again: bool = True) -> tuple[Found, Fo
     Found or None
         Where none does: the one law that leaves little more, for where windows show nothing.
     """
-    return concluded(*laws_added(found, say), say, again=again)
+    return concluded(*laws_added(found, say, effects=effects), say, again=again)
 
 
 def laws_added(
-    found: Found, say, *, known: WholeSearch | None = None, effects: frozenset[str] | None = None
+    found: Found, say, *, effects: frozenset[str] | None = None
 ) -> tuple[Found, WholeSearch]:
     """Parameters alone over whole recordings, and laws added as long as they leave too much.
 
@@ -83,23 +89,20 @@ def laws_added(
     ----------
     effects : frozenset of str or None
         Of the laws tried; None: of all that the case can have.
-    known : WholeSearch or None
-        From another growth of windows. It is continued if parameters alone cost as much with its
-        values.
     """
     own = in_sensor_noise(found.base_estimator, found.base)
-    found, search = _laws_added(found, own, say, known, effects)
+    found, search = _laws_added(found, own, say, effects)
     for _ in range(NOISE_RENEWED):
         if not search.taken or search.left() > OVERSTATED_NOISE:
             break
         say(f"whole recordings: laws leave {search.left():.2f}: again in the noise that they leave")
         own = in_noise_left_by(search.own, search.fit, apart=True)
-        found, search = _laws_added(found, own, say, None, effects)
+        found, search = _laws_added(found, own, say, effects)
     return found, search
 
 
 def _laws_added(
-    found: Found, own: Estimator, say, known: WholeSearch | None, effects: frozenset[str] | None
+    found: Found, own: Estimator, say, effects: frozenset[str] | None
 ) -> tuple[Found, WholeSearch]:
     """As `laws_added`, in the noise of an estimator of whole recordings."""
     own, plain, left = parameters_alone(own, found.base, say)
@@ -115,9 +118,6 @@ def _laws_added(
     say(f"whole recordings: these errors cost {found.excess:.0f} units more than noise")
     laws = [w for w in laws_of(found) if effects is None or w.effect in effects]
     search = WholeSearch(own, plain, found, laws, complete_below(left))
-    if known is not None and known.begins_like(search):
-        known.found = found
-        return found, known
     if found.needs_no_law:
         return found, search
     for _ in range(1 if found.sound else WHOLE_LAWS):
@@ -157,31 +157,41 @@ def concluded(
     return (found if nearly else replace(found, by_whole_runs=first_law(found, search))), nearly
 
 
-def of_first_growth(found: Found, search: WholeSearch, say) -> tuple[Found | None, bool]:
+class FirstEnd(NamedTuple):
     """What laws added to the first growth of windows show.
 
-    Returns
-    -------
-    Found or None
-        None if laws are not complete.
-    bool
-        Whether it is in doubt: the recordings are likelier with commands at other times, or values
-        are far from the rig file's without a law (those of laws were also fitted from there).
+    Attributes
+    ----------
+    found : Found or None
+        None if parameters are not sufficient and laws not complete.
+    timing : CommandTiming or None
+        With which the recordings are likelier.
+    doubted : bool
+        Whether values are far from the rig file's without a law (those of laws were also fitted
+        from there), or commands act at other times.
     """
+
+    found: Found | None = None
+    timing: CommandTiming | None = None
+    doubted: bool = True
+
+
+def of_first_growth(found: Found, search: WholeSearch, say) -> FirstEnd:
+    """What laws added to the first growth of windows show."""
     if not search.left() <= search.enough:
-        return None, True
+        return FirstEnd()
     if not found.needs_no_law:
         end = _finished(found, search, say, again=False)
-        if end is None or not end[0].complete:
-            return None, True
-        found = end[0]
+        if end is not None and end[0].complete:
+            found = end[0]
+        elif not found.sound:  # an error that small is not evidence of a law
+            return FirstEnd()
     own, fit, case = search.own, search.fit, search.own.problem.case
-    if found.needs_no_law and far_from_rig(own.problem, fit.x):
-        return found, True
+    far = not found.complete and far_from_rig(own.problem, fit.x)
     for timing in timings(case, own.problem.timing):
         if _with_timing(own, timing, fit.hypothesis, fit.x).cost < fit.cost - search.doubt():
-            return found, True
-    return found, False
+            return FirstEnd(found, timing)
+    return FirstEnd(found, doubted=far)
 
 
 def _finished(
@@ -302,8 +312,41 @@ def _with_other_timing(
         fit = _with_timing(own, timing, h, search.fit.x)
         if fit.cost < search.fit.cost - least:
             say("searched again: with laws of whole recordings, commands act at other times")
+            if search.left() <= search.enough:
+                return in_other_timing(search, timing, say)
             return with_whole_runs(begun(case, timing, say), say, again=False)
     return None
+
+
+def begins_no_better(search: WholeSearch, found: Found) -> bool:
+    """Whether whole recordings are no likelier with the timing and values of another growth.
+
+    Parameters alone and the laws taken are compared, in the noise of the other growth.
+    """
+    own = in_sensor_noise(found.base_estimator, found.base)
+    first = search.own.problem
+    problem = MultistepProblem(first.case, timing=first.timing, steps=own.problem.steps)
+    before, plain = with_problem(own, problem), found.base.hypothesis
+    least = SAME_END + ALIKE_EXCESS * excess(before, plain, search.plain.x)
+    for h, x in ((plain, search.plain.x), (search.fit.hypothesis, search.fit.x)):
+        ends = [with_best_delay(own, h, x)]
+        if h is plain:
+            ends.append(own.fit(h, found.base.x))
+        if min(end.cost for end in ends) < before.fit(h, x).cost - least:
+            return False
+        least = max(least, LEAST_OF_LEFT * search.plain_excess())
+    return True
+
+
+def in_other_timing(search: WholeSearch, timing: CommandTiming, say) -> tuple[Found, Found | None]:
+    """The search (`with_whole_runs`) with commands at other times, of laws that gained something.
+
+    For laws that are complete: the windows are those of the search, and no horizons are grown.
+    """
+    found, case = search.found, search.own.problem.case
+    estimator, base = in_timing(found.base_estimator, found.base, case, timing)
+    found = from_growth((estimator, base, found.base_horizon), say)
+    return with_whole_runs(found, say, again=False, effects=search.shortlist())
 
 
 def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
@@ -327,7 +370,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         if misfit(nearly.estimator, best.hypothesis, best.x) < share * left:
             return nearly
     if not found.steps:
-        return _with_shape(found, own, say)
+        return with_shape(found, own, say)
     if found.confirms_whole_runs:
         unseen = held_out_in_short_windows(found.by_whole_runs)
         if unseen is not None and unseen.gain > 0.0:
@@ -335,7 +378,7 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
             return found.by_whole_runs
     say(f"whole recordings: what windows showed leaves {left:.2f}")
     if far_from_rig(found.problem, found.best.x):
-        found, fit, left = _closer_to_rig(found, own, fit, say)
+        found, fit, left = closer_to_rig(found, own, fit, say)
     enough = complete_below(found.left_by_parameters)
     if left <= enough:
         found, fit = without_redundant(found, own, fit, enough, say)
@@ -348,49 +391,3 @@ def confirmed_by_whole_runs(found: Found, nearly: Found | None, say) -> Found:
         return found
     own, fit = in_own_share(own, fit)
     return replace(found, complete=True, estimator=own, best=fit, horizon=None)
-
-
-def _closer_to_rig(
-    found: Found, own: Estimator, fit: Estimate, say
-) -> tuple[Found, Estimate, float]:
-    """The laws of windows with values of whole recordings, if these are nearer to the rig file's.
-
-    Parameters alone can take the place of a delay, and its fit begins with their values. In windows
-    an unknown torque compensates for these.
-
-    Returns
-    -------
-    Found
-    Estimate and float
-        The fit of whole recordings, and its misfit.
-    """
-    h = fit.hypothesis
-    count = len(h.laws) - len(found.steps)
-    starts = [law.starts[0] for law in h.laws[:count]]
-    x = own.problem.start(h, starts)
-    laws = sum(map(count_values, h.laws[count:]))
-    x[x.size - laws :] = fit.x[x.size - laws :]
-    best = min(fit, converged(own, h, x), key=lambda f: f.cost)
-    left, of_windows = misfit(own, h, best.x), misfit(own, h, found.best.x)
-    if far_from_rig(own.problem, best.x) or not left < LEFT_OF_EACH * of_windows:
-        return found, fit, misfit(own, h, fit.x)
-    say(f"whole recordings: the same laws with values nearer to the rig file's leave {left:.2f}")
-    own, taken = in_own_share(own, best)
-    return replace(found, estimator=own, best=taken, horizon=None), best, left
-
-
-def _with_shape(found: Found, own: Estimator, say) -> Found:
-    """What was found, and the torque of unknown shape that explains most of what parameters leave.
-
-    In windows a slow torque can pass for noise that whole recordings do not have.
-    """
-    own, plain, _ = parameters_alone(own, found.base, say)
-    best = next(iter(shapes(Projection(own, plain))), None)
-    had = excess(own, plain.hypothesis, plain.x)
-    if best is None or had == 0.0:
-        return found
-    share = best.held_out / had
-    say(f"whole recordings: {best.sentence()}, explains {share:.2f} of the excess")
-    if share < max(SHAPE_SHARE, found.explained_once):  # a torque that acts once explains more
-        return found
-    return replace(found, base_shapes=[best, *found.base_shapes])

@@ -4,17 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_core.identify.law_search.candidate_fits import count_values
+from rsea_core.identify.law_search.candidate_fits import count_values, far_from_rig
 from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.multistep.criteria import (
     EXPLAINED,
     EXPLAINED_TOGETHER,
+    LEFT_OF_EACH,
     PER_VALUE,
     RICHER_GAIN,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
 from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect, worth
-from rsea_core.identify.whole_runs.sensor_noise import excess
+from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
 from rsea_core.identify.whole_runs.taken_laws import Trial
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
@@ -145,3 +146,32 @@ def in_own_share(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
     own = own.having(own.tracks)
     own.tempering = independent_share(own, fit.hypothesis, fit.x)
     return own, own.fit(fit.hypothesis, fit.x, iterations=4)
+
+
+def closer_to_rig(
+    found: Found, own: Estimator, fit: Estimate, say
+) -> tuple[Found, Estimate, float]:
+    """The laws of windows with values of whole recordings, if these are nearer to the rig file's.
+
+    Parameters alone can take the place of a delay, and its fit begins with their values. In windows
+    an unknown torque compensates for these.
+
+    Returns
+    -------
+    Found
+    Estimate and float
+        The fit of whole recordings, and its misfit.
+    """
+    h = fit.hypothesis
+    count = len(h.laws) - len(found.steps)
+    starts = [law.starts[0] for law in h.laws[:count]]
+    x = own.problem.start(h, starts)
+    laws = sum(map(count_values, h.laws[count:]))
+    x[x.size - laws :] = fit.x[x.size - laws :]
+    best = min(fit, converged(own, h, x), key=lambda f: f.cost)
+    left, of_windows = misfit(own, h, best.x), misfit(own, h, found.best.x)
+    if far_from_rig(own.problem, best.x) or not left < LEFT_OF_EACH * of_windows:
+        return found, fit, misfit(own, h, fit.x)
+    say(f"whole recordings: the same laws with values nearer to the rig file's leave {left:.2f}")
+    own, taken = in_own_share(own, best)
+    return replace(found, estimator=own, best=taken, horizon=None), best, left

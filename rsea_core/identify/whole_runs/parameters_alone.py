@@ -9,10 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.screening import Projection
+from rsea_core.identify.law_search.shape_search import shapes
 from rsea_core.identify.multistep.criteria import (
     BRIEFLY_SOUND,
     LEAST_EXCESS,
     LEAST_FINENESS,
+    SHAPE_SHARE,
     SOUND,
     STEP_ERROR,
     STEP_SHARE,
@@ -84,3 +87,20 @@ def step_error(own: Estimator, finer: Estimator, fit: Estimate) -> float:
     trial = [(fit.hypothesis, fit.x)]
     pairs = zip(own.innovations(trial), finer.innovations(trial), strict=True)
     return max(float(np.sqrt(np.max(np.mean((e[0] - f[0]) ** 2, axis=0)))) for e, f in pairs)
+
+
+def with_shape(found: Found, own: Estimator, say) -> Found:
+    """What was found, and the torque of unknown shape that explains most of what parameters leave.
+
+    In windows a slow torque can pass for noise that whole recordings do not have.
+    """
+    own, plain, _ = parameters_alone(own, found.base, say)
+    best = next(iter(shapes(Projection(own, plain))), None)
+    had = excess(own, plain.hypothesis, plain.x)
+    if best is None or had == 0.0:
+        return found
+    share = best.held_out / had
+    say(f"whole recordings: {best.sentence()}, explains {share:.2f} of the excess")
+    if share < max(SHAPE_SHARE, found.explained_once):  # a torque that acts once explains more
+        return found
+    return replace(found, base_shapes=[best, *found.base_shapes])

@@ -168,10 +168,14 @@ class WholeSearch(TakenLaws):
         own = self.own if quick is None else quick
         start = base if own is self.own else with_costs_of(own, base)
         found, bounded = [], []
+        shared = own.jacobian(start.hypothesis, start.x)[1] if len(candidates) > 1 else None
         for c in candidates:
             gained = max((t.gain for t in found), default=0.0)
             target = start.cost - LEAST_OF_BEST * gained if gained > 0.0 else np.inf
-            fit = fitted(own, start, c, factors=SIZES, iterations=iterations, target_cost=target)
+            fit = fitted(
+                own, start, c, factors=SIZES, iterations=iterations, target_cost=target,
+                shared=shared,
+            )  # fmt: skip
             fit = fit if own is self.own else with_costs_of(self.own, fit)
             gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
             if np.isfinite(gain):

@@ -11,17 +11,22 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.richer_laws import begun_with
 from rsea_core.identify.law_search.screening import Candidate, screen, screen_again
 from rsea_core.identify.multistep.criteria import (
-    ALIKE_EXCESS,
     DOUBT,
     NEIGHBOURS,
     PER_VALUE,
     RIVAL_SCALE,
-    SAME_END,
+    SHORTLISTED,
     WHOLE_FORMS,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.whole_runs.forms import alike, holds, richer_of
-from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit, well_fitted
+from rsea_core.identify.whole_runs.sensor_noise import (
+    converged,
+    excess,
+    misfit,
+    refitted_from_rig,
+    well_fitted,
+)
 from rsea_core.identify.whole_runs.unseen import other_values, without
 
 SIZES = (1.0, 0.3, 0.1)  # of the size that the screening saw: starts
@@ -84,14 +89,6 @@ class TakenLaws:
         """What parameters alone leave above the noise, in units."""
         return max(self.plain.cost - self.fit.cost, 0.0) + 1.0
 
-    def begins_like(self, other: "TakenLaws") -> bool:
-        """Whether parameters alone cost as much with the values and timing of another search."""
-        if self.own.problem.timing != other.own.problem.timing:
-            return False
-        h, x = other.plain.hypothesis, self.plain.x
-        more = float(other.own.costs([(h, x)])[0]) - other.plain.cost
-        return abs(more) < SAME_END + ALIKE_EXCESS * other.excess()
-
     def take(self, best: Trial, fit: Estimate, trials: Sequence[Trial], say) -> None:
         """A trial's law, with its fit of whole recordings."""
         self.fit = fit
@@ -99,9 +96,20 @@ class TakenLaws:
         self.rivals[best.law.key] = list(trials)
         self.nearest_number(best.law, say)
 
+    def shortlist(self) -> frozenset[str]:
+        """Effects of the laws taken, and of trials that gained a share of what the best did."""
+        effects = {law.effect for law in self.taken}
+        for trials in (self.first, *self.rivals.values()):
+            least = SHORTLISTED * max((t.gain for t in trials), default=0.0)
+            effects |= {t.law.effect for t in trials if t.gain > least}
+        return frozenset(effects)
+
     def to_minimum(self, trial: Trial) -> Estimate:
-        """A trial's fit, continued to its minimum."""
-        return well_fitted(self.own, converged(self.own, trial.fit.hypothesis, trial.fit.x))
+        """A trial's fit, continued to its minimum; to the lowest of several if it leaves much."""
+        fit = converged(self.own, trial.fit.hypothesis, trial.fit.x)
+        if misfit(self.own, fit.hypothesis, fit.x) <= self.enough:
+            return refitted_from_rig(self.own, fit)
+        return well_fitted(self.own, fit)
 
     def better_form(self, least: float, share: float, say) -> bool:
         """Take another form of a law; whether there is one worth it.
