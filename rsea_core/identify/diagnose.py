@@ -87,14 +87,14 @@ def diagnose(
         found = diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
         if not quick and (_leaves_much(found) or _may_be_an_offset(case, found)):
             say("laws leave much, or an offset imitates one: a second opinion by windows")
-            other = diagnose_windows(case, say=say)
+            other = diagnose_windows(case, thorough=thorough, say=say)
             return other if other.conclusion.found.complete else found
         if quick or not case.validation or found.document["verdict"] != "unexplained":
             return found
         say("no name fits: a second opinion by windows, which model the errors of the log")
-        return _better(found, lambda: diagnose_windows(case, say=say), say)
+        return _better(found, lambda: diagnose_windows(case, thorough=thorough, say=say), say)
     try:
-        found = diagnose_windows(case, quick=quick, say=say)
+        found = diagnose_windows(case, quick=quick, thorough=thorough, say=say)
     except (np.linalg.LinAlgError, FloatingPointError) as numeric:
         say(f"windows: {numeric}; free runs instead")
         try:

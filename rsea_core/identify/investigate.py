@@ -51,6 +51,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     refitted_from_rig,
 )
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
+from rsea_core.numeric.work_limit import no_work_left
 from rsea_core.recordings.case import Case
 
 
@@ -79,11 +80,13 @@ def investigate(
             case, shared = other, more
             say(f"not predicted, searched again with two thirds of them: {', '.join(missed)}")
             found, nearly = _whole_recordings(case, say)
-        if nearly is not None and nearly.explained > NEEDS_NO_WINDOWS:
+        wanted = nearly is not None and nearly.explained > NEEDS_NO_WINDOWS
+        if wanted and not no_work_left():
             found = _with_gear_mesh_in_whole_runs(case, nearly, say)
     if not (found.complete or found.sound):
-        add_all(found, laws_of(found), say, quick=quick)
-        found = _in_doubt(case, found, say, quick=quick)
+        brief = quick or no_work_left()
+        add_all(found, laws_of(found), say, quick=brief)
+        found = _in_doubt(case, found, say, quick=brief)
         if not quick:
             found = confirmed_by_whole_runs(found, nearly, say)
     found.shared = shared
@@ -110,11 +113,13 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
     end, timing, doubted = of_first_growth(found, search, say)
     if end is not None and not doubted:
         return end, None
-    if timing is not None:
+    if timing is not None and not no_work_left():
         say("searched again: with what whole recordings show, commands act at other times")
         other, _ = in_other_timing(search, timing, say)
         if other.complete or other.sound:
             return other, None
+    if no_work_left():
+        return concluded(found, search, say)
     again = from_growth(grown_again(first, case, say), say)
     if search.left() > search.enough and begins_no_better(search, again):
         say("whole recordings: no likelier so; the laws added before stand")
@@ -130,7 +135,7 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
 def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:
     """The best of further searches, where the end of the first is in doubt."""
     left, below = found.left_by_parameters, found.sound_below
-    if found.steps and not quick:
+    if found.steps and not quick and not no_work_left():
         found = _better_search(found, _begun_by_contender(found, say))
         # a missing law can pass for another timing of the command
         own, fit = with_better_timing(found.estimator, found.best, case, say)
@@ -139,12 +144,12 @@ def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:
             say("searched again: with the laws found, commands act at other times")
             again = searched(case, timing, say, quick=quick)
             found = _better_search(found, _begun_by_contender(again, say), again)
-    if not quick and _doubtful(found):
+    if not quick and _doubtful(found) and not no_work_left():
         shorter = in_shorter_windows(found, say)
         if shorter is not None:
             add_all(shorter, laws_of(shorter), say)
             found = shorter if predicts_closer(shorter, found) else found
-    if not quick and encoders_disagree(found):
+    if not quick and encoders_disagree(found) and not no_work_left():
         found = _better_search(found, _through_gear_mesh(case, found, say))
     return replace(found, left_by_parameters=left, sound_below=below)
 

@@ -20,6 +20,7 @@ from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_t
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
 from rsea_core.identify.whole_runs.single_zeros import zeros_of
 from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
+from rsea_core.numeric.work_limit import limited_work
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
@@ -29,6 +30,12 @@ QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
+MOST_WORK = 1.5e8  # simulated rows of a search, beyond which it begins nothing further
+CURTAILED = Finding(
+    kind=Kind.METHOD,
+    text="the recordings are long: further searches were left out, which could find other laws"
+    " (--thorough makes them)",
+)
 OF_THE_LOG = (CLOCK, FILTER, RATIO)
 OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is stated
 NEGLIGIBLE_OFFSET = 1e-4  # of the largest command: a smaller one is not stated
@@ -36,9 +43,15 @@ CLOCK_SHOWN = 5.0
 
 
 def diagnose_windows(
-    case: Case, *, quick: bool = False, say: Callable[[str], None] = lambda _: None
-) -> Diagnosis:
+    case: Case, *, quick: bool = False, thorough: bool = False,
+    say: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:  # fmt: skip
     """Locate, name and fit what a case's recordings show and its rig file does not.
+
+    Parameters
+    ----------
+    thorough : bool
+        Without a limit of work (`MOST_WORK`), at which further searches are left out.
 
     Raises
     ------
@@ -51,8 +64,12 @@ def diagnose_windows(
     if quick:
         most = max(BRIEF_ROWS, BRIEF_ROWS_OF_EACH * len(case.identification))
         case, cut = truncate(case, np.inf, most, reason="without --quick all rows are")
-    conclusion = WindowVerdict(investigate(case, quick=quick, say=say), case, say)
-    findings = [*cut, *([QUICK_LOOK] if quick else [])] + [
+    with limited_work(np.inf if thorough else MOST_WORK) as work:
+        found = investigate(case, quick=quick, say=say)
+    say(f"work: {work.done:.3g} simulated rows")
+    conclusion = WindowVerdict(found, case, say)
+    brief = QUICK_LOOK if quick else CURTAILED if work.curtailed else None
+    findings = [*cut, *([brief] if brief else [])] + [
         Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps
     ]
     findings += findings_of(conclusion) + servo_findings(conclusion, filled)

@@ -22,6 +22,7 @@ from rsea_core.identify.multistep.steps import (
     normal_equations,
 )
 from rsea_core.identify.multistep.tracks import Track, block_rows, initial_track, prepared
+from rsea_core.numeric.work_limit import count_work
 
 STEP = 0.02  # of the unknowns, for differences
 MOST_MOVED = 100.0  # root of the sum of squares by which such a step may move the innovations
@@ -29,6 +30,7 @@ FINE = 1e-3  # of such a step, where a direction that no reading determines matt
 LEAST_STEP = 1e-5  # of the unknowns
 ALIKE = 4.0  # factor within which a step stays: simulations are used again
 MOST_KEPT = 1e8  # bytes of residuals
+ROWS_OF_RUN = 1000  # as work: what a run costs beside its rows
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
 ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
@@ -140,6 +142,7 @@ class Estimator:
             first: dict[bytes, int] = {}  # of machines that run alike, whatever their sensors read
             which = [first.setdefault(m.machine, len(first)) for m in machines]
             unlike = [machines[which.index(j)] for j in range(len(first))]
+            count_work(len(unlike) * (e.rows * e.finer + ROWS_OF_RUN))
             runs = e.runs(unlike, t.windows)
             runs = runs if len(unlike) == len(machines) else runs[which]
             found.append(e.measured[None] - e.readings(runs, machines, t.windows))

@@ -41,6 +41,7 @@ from rsea_core.identify.multistep.horizons import (
     with_problem,
 )
 from rsea_core.identify.multistep.tracks import prepared
+from rsea_core.numeric.work_limit import no_work_left
 from rsea_core.recordings.case import Case
 
 
@@ -103,6 +104,8 @@ def _grown_from_output_errors(
     others = (AS_LOGGED, *timings(case, AS_LOGGED)) if timing is None else ()
     for each in (used, *(t for t in others if t != used)):
         problem = MultistepProblem(case, timing=each, steps=steps)
+        if ends and no_work_left():
+            break
         if ends:
             unsmoothed = ends.get(replace(each, fast_share=1.0)) if each.smooth else None
             most = least if unsmoothed is None else -LINEAR_GAIN

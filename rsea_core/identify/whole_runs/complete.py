@@ -54,6 +54,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
 )
 from rsea_core.identify.whole_runs.single_zeros import with_single_zeros
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without, without_redundant
+from rsea_core.numeric.work_limit import no_work_left
 
 
 def with_whole_runs(
@@ -122,7 +123,9 @@ def _laws_added(
         return found, search
     for _ in range(1 if found.sound else WHOLE_LAWS):
         all_taken = effects is not None and effects <= {law.effect for law in search.taken}
-        if search.left() <= search.enough or all_taken or not search.add(say):
+        if search.left() <= search.enough or all_taken or (search.taken and no_work_left()):
+            break
+        if not search.add(say):
             break
         if found.unpredicted and search.left() > MUCH_LEFT * left:
             say("whole recordings: no law predicts them; no further one is added")
@@ -131,7 +134,7 @@ def _laws_added(
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
             return laws_added(other, say, effects=effects)
-    rival = None if found.sound else begun_with_rival(search, say)
+    rival = None if found.sound or no_work_left() else begun_with_rival(search, say)
     return found, rival or search
 
 
@@ -141,7 +144,7 @@ def concluded(
     """What laws added to parameters alone show, as `with_whole_runs`."""
     if found.needs_no_law:
         return found, None
-    if not found.sound:
+    if not found.sound and not no_work_left():
         search = search.begun_at_bound(say) or search
     if search.left() <= search.enough:
         finished = _finished(found, search, say, again=again)
@@ -151,6 +154,7 @@ def concluded(
         return found, None
     found = replace(found, explained_once=explained_once(search))
     nearly = nearly_complete(found, search, say)
+    again = again and not no_work_left()
     other = _with_other_timing(search, say) if again and search.taken else None
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
         return other
@@ -178,9 +182,10 @@ class FirstEnd(NamedTuple):
 
 def of_first_growth(found: Found, search: WholeSearch, say) -> FirstEnd:
     """What laws added to the first growth of windows show."""
-    if not search.left() <= search.enough:
+    finished = search.left() <= search.enough
+    if not (finished or found.sound):
         return FirstEnd()
-    if not found.needs_no_law:
+    if finished and not found.needs_no_law:
         end = _finished(found, search, say, again=False)
         if end is not None and end[0].complete:
             found = end[0]
@@ -205,11 +210,12 @@ def _finished(
     if other is not None:
         return other
     search.refine(say)
-    search.seek_rivals(say)
+    if not no_work_left():
+        search.seek_rivals(say)
     search.compare(say)
     search.predict(say)
     say(f"whole recordings: laws taken leave {search.excess():.0f} units more than noise")
-    if not found.sound and search.excess() >= LEAST_EXCESS:
+    if not found.sound and search.excess() >= LEAST_EXCESS and not no_work_left():
         other = _with_other_timing(search, say, least=NEARLY_EXPLAINED) if again else None
         if other is not None and other[0].complete:
             return other

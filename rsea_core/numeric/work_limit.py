@@ -1,0 +1,50 @@
+"""A limit of work that is counted and not timed.
+
+What a search leaves out when it has worked long enough must not depend on the machine or on what
+else runs there: the same inputs give the same result. Work is counted in units of the caller's
+choice, and whoever is about to begin something optional asks whether any is left.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+
+
+@dataclass
+class Work:
+    """Work done, its limit, and whether something was left out because of it."""
+
+    most: float
+    done: float = 0.0
+    curtailed: bool = False
+
+
+_current: ContextVar[Work | None] = ContextVar("work", default=None)
+
+
+@contextmanager
+def limited_work(most: float) -> Iterator[Work]:
+    """A context in which work is counted and limited; with inf it is only counted."""
+    work = Work(most)
+    token = _current.set(work)
+    try:
+        yield work
+    finally:
+        _current.reset(token)
+
+
+def count_work(amount: float) -> None:
+    """Add to the work done; nothing outside of a limit."""
+    work = _current.get()
+    if work is not None:
+        work.done += amount
+
+
+def no_work_left() -> bool:
+    """Whether the limit is reached: whoever asks leaves something out then."""
+    work = _current.get()
+    if work is None or work.done < work.most:
+        return False
+    work.curtailed = True
+    return True
