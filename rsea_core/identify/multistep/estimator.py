@@ -3,7 +3,6 @@
 from collections import OrderedDict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +11,11 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, huber_weights
 from rsea_core.identify.multistep.steps import (
-    LONGEST_STEP,
-    PROBE,
-    UNDAMPED,
     Start,
-    correction,
-    curved,
-    damped_step,
-    normal_equations,
+    largest_decrease,
+    least_fall,
+    normal,
+    stepped,
 )
 from rsea_core.identify.multistep.tracks import Track, block_rows, initial_track, prepared
 from rsea_core.numeric.work_limit import count_work
@@ -33,12 +29,6 @@ MOST_KEPT = 1e8  # bytes of residuals
 ROWS_OF_RUN = 1000  # as work: what a run costs beside its rows
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
-ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
-NEGLIGIBLE = 0.05  # units that no step is worth
-FORESEEN = 0.5  # share of the foreseen fall, below which a corrected Jacobian is taken anew
-CORRECTIONS = 4  # of one Jacobian
-SHORTENED = 0.99  # of the longest step: a step of this length was shortened
-BEYOND_FORESEEN = 3.0  # times the decrease that a Jacobian predicts, which a fit hardly exceeds
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -233,119 +223,27 @@ class Estimator:
             the cost with them, new Jacobians are of the other unknowns only: candidates fitted
             beside the same base have most unknowns in common.
         """
-        low, high = self.problem.bounds(h)
-        x = np.clip(x, low, high)
+        x = np.clip(x, *self.problem.bounds(h))
         cost = self.costs([(h, x)])[0]
         damping, arrived, taken = 1e-3, False, 0
         while taken < iterations and np.isfinite(cost) and not arrived:
             level, columns = self.jacobian(h, x, fine=fine, shared=shared)
-            needed, before, own = cost - target_cost, cost, shared is None
-            if needed > 0.0 and needed > self._largest_decrease(h, x, level, columns):
+            needed = cost - target_cost
+            if needed > 0.0 and needed > largest_decrease(self, h, x, level, columns):
                 break
-            taken, corrected = taken + 1, 0
-            while True:
-                fresh = corrected == 0
-                A, g = self._normal(h, x, level, columns)
-                step, damping = self._best_step(h, x, cost, A, g, damping, fresh)
-                if fresh and own:
-                    step = self._along_valley(Start(h, x, cost, A, g), level, columns, step)
-                if step is None:
-                    arrived = fresh and own
-                    break
-                moved, fall = step.x - x, cost - step.cost
-                little = fall < max(0.0 if fine else ENOUGH * abs(cost), NEGLIGIBLE)
-                arrived = fresh and own and little
-                if fresh and fall < NEGLIGIBLE:  # the next fit begins where a Jacobian is known
-                    break
-                foreseen = -float(g @ moved + 0.5 * moved @ A @ moved)
-                x, cost = step.x, step.cost
-                if little or fall < FORESEEN * foreseen or corrected == CORRECTIONS:
-                    break
-                columns = [
-                    J + correction(J, moved, after - e)
-                    for J, e, after in zip(columns, level, step.innovations, strict=True)
-                ]
-                level, corrected = step.innovations, corrected + 1
-            if not own:
-                little = before - cost < max(ENOUGH * abs(cost), NEGLIGIBLE)
-                shared = None if little else [J[: len(s)] for J, s in zip(columns, shared)]
+            begin = Start(h, x, cost, *normal(self, h, x, level, columns))
+            end = stepped(self, begin, level, columns, damping, fine=fine, whole=shared is None)
+            if shared is not None:
+                little = cost - end.cost < least_fall(cost)
+                shared = None if little else [J[: len(s)] for J, s in zip(end.columns, shared)]
+            x, cost, damping, arrived, _ = end
+            taken += 1
         centre, weight = self.problem.prior(h)
         prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(
             hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,
             likelihood=float(cost - prior_cost) / self.tempering,
         )  # fmt: skip
-
-    def _normal(self, h: Hypothesis, x: NDArray, level, columns) -> tuple[NDArray, NDArray]:
-        """Gauss-Newton matrix (n, n) and gradient (n,) of the cost."""
-        centre, weight = self.problem.prior(h)
-        A, g = normal_equations(level, columns)
-        return (
-            np.diag(weight**2) + self.tempering * A,
-            weight**2 * (x - centre) + self.tempering * g,
-        )
-
-    def _largest_decrease(self, h: Hypothesis, x: NDArray, level, columns) -> float:
-        """Decrease of the cost that a fit from x hardly exceeds.
-
-        inf where the step is of the greatest length: a Jacobian that far from the minimum predicts
-        no decrease.
-        """
-        A, g = self._normal(h, x, level, columns)
-        v = damped_step(x, A, g, UNDAMPED, *self.problem.bounds(h)) - x
-        if np.max(np.abs(v) / (LONGEST_STEP + np.abs(x)), initial=0.0) > SHORTENED:
-            return np.inf
-        return BEYOND_FORESEEN * -float(g @ v + 0.5 * v @ A @ v)
-
-    def _best_step(
-        self, h: Hypothesis, x: NDArray, cost: float, A: NDArray, g: NDArray, damping: float,
-        fresh: bool,
-    ) -> tuple["_Step | None", float]:  # fmt: skip
-        """The best of some damped steps that lowers the cost, and the damping for the next one."""
-        low, high = self.problem.bounds(h)
-        for _attempt in range(3 if fresh else 1):
-            factors = (damping, damping * 30.0, damping * 1000.0)[: 3 if fresh else 2]
-            trials = [(h, damped_step(x, A, g, f, low, high)) for f in factors]
-            found = self.innovations(trials)
-            costs = self.costs(trials, found)
-            best = int(np.argmin(costs))
-            if costs[best] < cost:
-                step = _Step(trials[best][1], float(costs[best]), [e[best] for e in found])
-                return step, max(damping * (0.1, 3.0, 100.0)[best], 1e-8)
-            damping = damping * 1e4 if fresh else damping
-        return None, damping
-
-    def _along_valley(
-        self, start: Start, level: Sequence[NDArray], columns: Sequence[NDArray],
-        step: "_Step | None",
-    ) -> "_Step | None":  # fmt: skip
-        """A step, or a better one along the curve that an undamped step begins (`curved`)."""
-        h, x, cost, A, g = start
-        bounds = self.problem.bounds(h)
-        v = damped_step(x, A, g, UNDAMPED, *bounds) - x
-        foreseen = -float(g @ v + 0.5 * v @ A @ v)
-        fall = 0.0 if step is None else cost - step.cost
-        if foreseen - fall < max(NEGLIGIBLE, FORESEEN * foreseen):
-            return step
-        probed = [e[0] for e in self.innovations([(h, x + PROBE * v)])]
-        ends = curved(start, v, level, columns, probed, self.tempering)
-        if not ends:
-            return step
-        trials = [(h, np.clip(end, *bounds)) for end in ends]
-        found = self.innovations(trials)
-        costs = self.costs(trials, found)
-        best = int(np.argmin(costs))
-        if not costs[best] < cost - fall:
-            return step
-        return _Step(trials[best][1], float(costs[best]), [e[best] for e in found])
-
-
-class _Step(NamedTuple):
-    """Unknowns (n,) that lower the cost, that cost, and the innovations (n, p) there."""
-
-    x: NDArray
-    cost: float
-    innovations: list[NDArray]
 
 
 def independent_share(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:

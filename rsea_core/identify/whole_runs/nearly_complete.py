@@ -14,9 +14,9 @@ from rsea_core.identify.multistep.criteria import (
     RICHER_GAIN,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, independent_share
-from rsea_core.identify.whole_runs.search import WholeSearch, best_of_each_effect, worth
+from rsea_core.identify.whole_runs.search import WholeSearch, worth
 from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
-from rsea_core.identify.whole_runs.taken_laws import Trial
+from rsea_core.identify.whole_runs.taken_laws import Trial, best_of_each_effect
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
 

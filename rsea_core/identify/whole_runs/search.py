@@ -55,7 +55,7 @@ from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
 from rsea_core.identify.whole_runs.order_analysis import along_motion
 from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
 from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
-from rsea_core.identify.whole_runs.taken_laws import SIZES, TakenLaws, Trial
+from rsea_core.identify.whole_runs.taken_laws import SIZES, TakenLaws, Trial, best_of_each_effect
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
 
 
@@ -135,12 +135,6 @@ class WholeSearch(TakenLaws):
         least = CLOSE_TO_BEST * max((t.gain for t in trials), default=0.0)
         trials = [self.continued(t) if t.gain > least else t for t in trials]
         return sorted(trials, key=lambda t: -t.gain)
-
-    def continued(self, trial: Trial) -> Trial:
-        """A trial after more iterations of its fit."""
-        fit = self.own.fit(trial.fit.hypothesis, trial.fit.x, iterations=8)
-        gain = trial.gain + trial.fit.cost - fit.cost
-        return replace(trial, fit=fit, gain=gain, left=misfit(self.own, fit.hypothesis, fit.x))
 
     def of_many_starts(self, laws: Sequence[Law]) -> list[Candidate]:
         """Laws whose wave may have any length, begun at the length that windows show.
@@ -345,14 +339,6 @@ def _with_trials(known: Sequence[Trial], others: Sequence[Trial]) -> list[Trial]
     keys = {t.law.key for t in others}
     kept = [t for t in known if t.law.key not in keys]
     return sorted([*kept, *others], key=lambda t: -t.gain)
-
-
-def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
-    """The best trial of each effect and reading, best first."""
-    found: dict[tuple, Trial] = {}
-    for t in trials:
-        found.setdefault((t.law.effect, t.law.sensor), t)
-    return list(found.values())
 
 
 def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[Trial]:

@@ -55,6 +55,14 @@ class Trial:
         return self.candidate.law
 
 
+def best_of_each_effect(trials: Sequence[Trial]) -> list[Trial]:
+    """The best trial of each effect and reading, best first."""
+    found: dict[tuple, Trial] = {}
+    for t in trials:
+        found.setdefault((t.law.effect, t.law.sensor), t)
+    return list(found.values())
+
+
 @dataclass
 class TakenLaws:
     """Laws taken so far, and what each was compared with."""
@@ -103,6 +111,12 @@ class TakenLaws:
             least = SHORTLISTED * max((t.gain for t in trials), default=0.0)
             effects |= {t.law.effect for t in trials if t.gain > least}
         return frozenset(effects)
+
+    def continued(self, trial: Trial) -> Trial:
+        """A trial after more iterations of its fit."""
+        fit = self.own.fit(trial.fit.hypothesis, trial.fit.x, iterations=8)
+        gain = trial.gain + trial.fit.cost - fit.cost
+        return replace(trial, fit=fit, gain=gain, left=misfit(self.own, fit.hypothesis, fit.x))
 
     def to_minimum(self, trial: Trial) -> Estimate:
         """A trial's fit, continued to its minimum; to the lowest of several if it leaves much."""
