@@ -80,6 +80,7 @@ from rsea_core.identify.multistep.horizons import likelier
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER, nuisances
 from rsea_core.identify.multistep.timing_choice import parameters_with_timing
 from rsea_core.machine.inputs import POSITION_COMMAND
+from rsea_core.numeric.work_limit import no_work_left
 from rsea_core.recordings.case import Case
 
 TORQUE_CONSTANT = "torque_constant_Nm_per_A"
@@ -154,7 +155,7 @@ def add_all(
 
 def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
     """Add law after law, with longer windows as far as they allow."""
-    while len(found.steps) < LAWS:
+    while len(found.steps) < LAWS and not (found.steps and no_work_left()):
         step = _next_law(found, laws, say, quick=quick)
         if step is None:
             break
@@ -325,6 +326,8 @@ def _finished(
     chosen = rough[:most] + [pair for pair in rough[most:] if pair[0].law.key in choice.apart]
     finished, beyond, without, best = [], [], [], 0.0
     for place, (c, fit) in enumerate(chosen):
+        if place >= FEWER_FINISHED and no_work_left():
+            break
         enough = np.inf if quick or place >= SECOND_STARTS else WEAK * best
         entry, bound = _end(estimator, base, c, fit, say, enough=enough)
         for other in _other_forms(c, choice.screened) if bound and not quick else ():

@@ -1,9 +1,7 @@
 """Laws with which whole recordings are predicted to the sensors' noise (docs/diagnosis.md 10.4).
 
-Where parameters alone leave more than that, laws are added one by one, each the one that lowers
-the error most, until nothing is left; then those are taken out that the others make redundant. A
-set of laws that leaves nothing but noise stands, and no windows are searched; one that leaves more
-proves nothing.
+Where parameters alone leave more, laws are added, each the one that lowers the error most, and
+redundant ones removed. Laws that leave nothing but noise stand; others prove nothing.
 """
 
 from collections.abc import Sequence
@@ -44,6 +42,7 @@ from rsea_core.identify.multistep.criteria import (
     PULSES,
     QUICK_ITERATIONS,
     RICHER_GAIN,
+    SAME_END,
     UNPREDICTED,
     WHOLE_LAWS,
     WHOLE_RIVALS,
@@ -53,7 +52,12 @@ from rsea_core.identify.multistep.experiment import ANGLES
 from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, with_costs_of
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
 from rsea_core.identify.whole_runs.order_analysis import along_motion
-from rsea_core.identify.whole_runs.sensor_noise import converged, excess, misfit
+from rsea_core.identify.whole_runs.sensor_noise import (
+    converged,
+    excess,
+    misfit,
+    refitted_from_rig,
+)
 from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
 from rsea_core.identify.whole_runs.taken_laws import SIZES, TakenLaws, Trial, best_of_each_effect
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
@@ -349,6 +353,8 @@ def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[T
         fit = search.fit if t.law is law else t.fit
         if t.law is not law and any(t is other for other in near[:WHOLE_RIVALS]):
             fit = converged(search.own, fit.hypothesis, fit.x)
+            if fit.cost < search.fit.cost + search.doubt():  # as near to the rig file as the law's
+                fit = refitted_from_rig(search.own, fit)
         gain = search.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
         left = misfit(search.own, fit.hypothesis, fit.x)
         found.append(replace(t, fit=fit, gain=gain, left=left))
@@ -374,17 +380,21 @@ def plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     Encoders have whole counts: where a spring explains as much, no scale factor of an angle is.
     Uneven rows of a log leave an error in proportion to the gain, which further values can fit.
     Of equally plain laws one that keeps the machine close to its rig file is taken unless it gains
-    far less: two encoders that disagree by a factor do not tell which of them is wrong.
+    far less: two encoders that disagree by a factor do not tell which of them is wrong. What acts
+    on a rigid train acts alike in the gear and at the load: it is named at the load.
     """
     best = max(trials, key=worth)
     doubt = max(doubt, ALIKE_OF_GAIN * best.gain)
     alike = [t for t in trials if worth(t) > worth(best) - doubt]
-    return min(
-        alike,
-        key=lambda t: (
-            t.law.effect == DriveDeadZone.effect,
-            t.law.effect == SensorScale.effect and t.law.sensor in ANGLES,
-            count_values(t.law),
-            PRIOR_AMONG_ALIKE * t.fit.prior_cost - t.gain,
-        ),
-    )
+
+    def form(t: Trial) -> tuple[bool, bool, int]:
+        of_angle = t.law.effect == SensorScale.effect and t.law.sensor in ANGLES
+        return t.law.effect == DriveDeadZone.effect, of_angle, count_values(t.law)
+
+    def cost(t: Trial) -> float:
+        return PRIOR_AMONG_ALIKE * t.fit.prior_cost - t.gain
+
+    plain = [t for t in alike if form(t) == min(map(form, alike))]
+    least = min(map(cost, plain))
+    same = [t for t in plain if cost(t) < least + SAME_END]
+    return min(same, key=lambda t: (t.law.subsystem != "load", cost(t)))

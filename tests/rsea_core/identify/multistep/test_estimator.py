@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-import rsea_core.identify.multistep.estimator as estimator_module
+import rsea_core.identify.multistep.steps as steps_module
 from rsea_core.effects.registry import LoadFriction
+from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import STEP_ERROR
 from rsea_core.identify.multistep.estimator import Estimator
@@ -43,12 +44,37 @@ def test_a_fit_that_has_arrived_has_no_slope_and_a_second_fit_gains_nothing(case
 
 def test_corrected_jacobians_lead_to_the_same_optimum_with_fewer_new_ones(case, monkeypatch):
     _, fit, taken = fitted(case, off=3.0)
-    monkeypatch.setattr(estimator_module, "CORRECTIONS", 0)
+    monkeypatch.setattr(steps_module, "CORRECTIONS", 0)
     _, plain, each_step = fitted(case, off=3.0)
     assert fit.arrived
     assert plain.arrived
     assert abs(fit.cost - plain.cost) < max(1e-5 * abs(fit.cost), 0.05)
     assert taken < each_step
+
+
+def test_shared_derivatives_lead_to_the_same_optimum_with_fewer_new_ones(case):
+    """Friction beside parameters alone, with derivatives by these where there is no friction."""
+    estimator, plain, _ = fitted(case)
+    friction = next(w for w in catalogue(case).values() if w.effect == LoadFriction.effect)
+    h = Hypothesis(laws=(*plain.hypothesis.laws, friction))
+    x = np.concatenate([plain.x, estimator.problem.start(h)[plain.x.size :]])
+    derivatives = estimator.jacobian
+    ends = []
+    for given in (None, derivatives(plain.hypothesis, plain.x)[1]):
+        new = []
+
+        def counted(*args, shared=None, _new=new, **how):
+            _new.append(x.size - (0 if shared is None else len(shared[0])))
+            return derivatives(*args, shared=shared, **how)
+
+        estimator.jacobian = counted
+        estimator.fit(h, x, iterations=3, shared=given)
+        ends.append((sum(new), estimator.fit(h, x, iterations=30, shared=given)))
+    (all_new, best), (fewer, other) = ends
+    assert best.arrived
+    assert other.arrived
+    assert abs(best.cost - other.cost) < max(1e-5 * abs(best.cost), 0.05)
+    assert fewer < all_new
 
 
 def test_a_fit_that_cannot_reach_the_cost_needed_ends_and_one_that_can_is_unchanged(case):

@@ -5,10 +5,13 @@ from dataclasses import replace
 import pytest
 
 import rsea_core.identify.investigate as investigate_module
+import rsea_core.identify.window_diagnosis as window_diagnosis
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.search import begun
-from rsea_core.identify.whole_runs.complete import laws_added, of_first_growth
+from rsea_core.identify.multistep.command_timing import CommandTiming
+from rsea_core.identify.whole_runs.complete import begins_no_better, laws_added, of_first_growth
+from rsea_core.numeric.work_limit import limited_work
 from rsea_core.recordings.case import Case
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -53,12 +56,27 @@ def test_windows_are_grown_again_where_laws_were_found_with_a_wrong_timing(
     assert grown
 
 
+def test_complete_laws_are_searched_again_in_the_same_windows_where_another_timing_is_likelier(
+    tmp_path, grown, monkeypatch
+):
+    def held(*given):
+        linear = CommandTiming(linear=True)
+        return of_first_growth(*given)._replace(timing=linear, doubted=True)
+
+    monkeypatch.setattr(investigate_module, "of_first_growth", held)
+    lines = []
+    assert_friction(investigate(axis(tmp_path), say=lines.append))
+    assert any("commands act at other times" in line for line in lines)
+    assert not grown
+
+
 def test_complete_laws_in_doubt_stand_where_another_growth_finds_none(tmp_path, grown, monkeypatch):
     ends = []
 
     def doubted(*given):
-        ends.append(of_first_growth(*given)[0])
-        return ends[0], True
+        end = of_first_growth(*given)
+        ends.append(end.found)
+        return end._replace(timing=None, doubted=True)
 
     def incomplete(found, search, say):
         return replace(found, complete=False, sound_below=0.0), None
@@ -71,11 +89,25 @@ def test_complete_laws_in_doubt_stand_where_another_growth_finds_none(tmp_path, 
     assert found is ends[0]
 
 
-def test_a_search_is_continued_from_another_growth_that_ends_alike(tmp_path):
-    found = begun(axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig()), None, print)
-    _, search = laws_added(found, print)
-    again, same = laws_added(found, print, known=search)
-    assert same is search
-    assert same.found is again
-    search.plain = replace(search.plain, x=search.plain.x + 1.0)
-    assert laws_added(found, print, known=search)[1] is not search
+def test_another_growth_gains_nothing_unless_whole_recordings_are_likelier_with_it(tmp_path):
+    case = axis(tmp_path)
+    held, linear = (begun(case, CommandTiming(linear=each), print) for each in (False, True))
+    _, search = laws_added(linear, print)
+    assert begins_no_better(search, linear)
+    assert begins_no_better(search, held)
+    _, search = laws_added(held, print)
+    assert not begins_no_better(search, linear)
+
+
+def test_a_search_with_little_work_ends_early_and_the_diagnosis_states_it(tmp_path, monkeypatch):
+    """Two steps in the place of a search: nothing further is begun after the first growth."""
+    case = axis(tmp_path)
+    with limited_work(1.0) as work:
+        found = investigate(case)
+    assert work.curtailed
+    assert found.base.arrived or found.complete
+    monkeypatch.setattr(window_diagnosis, "MOST_WORK", 1.0)
+    texts = [f.text for f in window_diagnosis.diagnose_windows(case).findings]
+    assert window_diagnosis.CURTAILED.text in texts
+    texts = [f.text for f in window_diagnosis.diagnose_windows(case, thorough=True).findings]
+    assert window_diagnosis.CURTAILED.text not in texts

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import pytest
 
 from rsea_core.effects.drive_dead_zone import DriveDeadZone
+from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.spring_parallel import SpringParallel
@@ -19,8 +20,9 @@ DOUBT = 8.0
 
 def trial(effect, gain: float, *, sensor: str = "", values: int = 1, prior: float = 0.0) -> Trial:
     law = SimpleNamespace(
-        effect=effect.effect, sensor=sensor, unknowns=(SimpleNamespace(scale=1.0),) * values
-    )
+        effect=effect.effect, sensor=sensor, unknowns=(SimpleNamespace(scale=1.0),) * values,
+        subsystem=effect.port.value[0],
+    )  # fmt: skip
     return Trial(
         candidate=SimpleNamespace(law=law), fit=SimpleNamespace(prior_cost=prior), gain=gain,
         left=1.0,
@@ -62,6 +64,13 @@ def test_a_move_of_the_rig_values_that_is_nearly_free_does_not_outweigh_the_fit(
         trial(SpringParallel, 2_400_000.0, prior=1.6),
     )
     assert plainest([closer, close], DOUBT) is close
+
+
+def test_of_laws_that_fit_alike_the_one_at_the_load_is_taken():
+    """Friction of a rigid train is the same in the gear and at the load."""
+    gear, load = trial(GearFriction, 500.001), trial(LoadFriction, 500.0)
+    assert plainest([gear, load], DOUBT) is load
+    assert plainest([trial(GearFriction, 505.0), load], DOUBT).gain == 505.0
 
 
 def test_no_small_law_is_taken_where_the_errors_cost_no_more_than_noise():

@@ -1,0 +1,33 @@
+"""Work is counted within a limit alone, and what is left out because of it is known."""
+
+import pytest
+
+from rsea_core.numeric.work_limit import count_work, limited_work, no_work_left
+
+
+def test_work_is_counted_within_its_context_and_not_outside():
+    count_work(5.0)
+    assert not no_work_left()
+    with limited_work(10.0) as work:
+        count_work(4.0)
+        assert not no_work_left()
+        assert not work.curtailed
+        count_work(6.0)
+        assert no_work_left()
+        assert work.curtailed
+    assert work.done == 10.0
+    assert not no_work_left()
+
+
+def test_an_inner_limit_hides_the_outer_one_until_it_ends():
+    with limited_work(1.0) as outer:
+        with limited_work(float("inf")) as inner:
+            count_work(100.0)
+            assert not no_work_left()
+        assert (outer.done, inner.done) == (0.0, 100.0)
+
+
+def test_an_error_ends_the_limit():
+    with pytest.raises(ValueError, match="stop"), limited_work(0.0):
+        raise ValueError("stop")
+    assert not no_work_left()
