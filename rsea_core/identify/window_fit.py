@@ -31,6 +31,7 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretche
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import with_best_delay, with_problem
 from rsea_core.identify.multistep.kalman_filter import huber_squares
+from rsea_core.identify.multistep.noise_estimate import SLOW_INPUT
 from rsea_core.identify.multistep.steps import normal_equations
 from rsea_core.machine.inputs import POSITION_COMMAND
 
@@ -186,11 +187,29 @@ def leaves_much_torque(estimator: Estimator) -> bool:
     return not smooth and _largest_unknown_torque(estimator)[0] > UNKNOWN_MOST
 
 
-def _largest_unknown_torque(estimator: Estimator) -> tuple[float, float, float]:
-    """Share of the usual torque, size [Nm], and the time of the mean [s]."""
+def leaves_some_torque(estimator: Estimator) -> bool:
+    """Whether that torque and the slow one are more than a negligible share of the usual one.
+
+    An amplifier's offset that drifts makes predictions over long windows depend on each other and
+    is no physics of the machine.
+    """
+    return _largest_unknown_torque(estimator, slow=True)[0] > UNKNOWN_SHARE
+
+
+def _largest_unknown_torque(
+    estimator: Estimator, *, slow: bool = False
+) -> tuple[float, float, float]:
+    """Share of the usual torque, size [Nm], and the time of the mean [s].
+
+    Parameters
+    ----------
+    slow : bool
+        Include the standard deviation of the torque that varies slowly.
+    """
     found = []
     for t in estimator.tracks:
-        size, usual = float(np.hypot(*t.noise.inputs[:2])), float(max(t.scale.torque_Nm))
+        inputs = t.noise.inputs[[0, 1, SLOW_INPUT] if slow else [0, 1]]
+        size, usual = float(np.linalg.norm(inputs)), float(max(t.scale.torque_Nm))
         found.append((size / usual if usual > 0.0 else 0.0, size, t.scale.time_s))
     return max(found)
 

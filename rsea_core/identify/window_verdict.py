@@ -46,6 +46,7 @@ from rsea_core.identify.window_fit import (
     fit_of,
     late_command,
     leaves_much_torque,
+    leaves_some_torque,
     rungs_of,
     spread_of,
     strained_value,
@@ -93,7 +94,8 @@ class WindowVerdict(Conclusion):
         self.unbalance = None if self.unknown is not None else self._moved_gravity()
         self.delayed = late_command(self)
         self.dependent = self.estimator.tempering < DEPENDENT and self.error > DOUBTED_ERROR
-        self.dependent &= not found.sound and not self.problem.timing.smooth
+        known = found.sound or self.problem.timing.smooth
+        self.dependent &= not known and leaves_some_torque(self.estimator)
         self.unaccounted = doubted and leaves_much_torque(self.estimator)
         self.reason = _reason_of(self)
         self.verdict = self._verdict()
@@ -236,9 +238,7 @@ class WindowVerdict(Conclusion):
     def index_of(self, j: int) -> int:
         """Index of the first unknown of law j."""
         before = self.fit.hypothesis.laws[:j]
-        return len(self.problem.nominals) + sum(
-            sum(p.scale > 0.0 for p in law.unknowns) for law in before
-        )
+        return len(self.problem.nominals) + sum(map(count_values, before))
 
     # ---- what reports ask
 
