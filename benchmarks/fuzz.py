@@ -330,7 +330,7 @@ def attack(reader: str, inputs: int, seed: int, folder: Path) -> tuple[Counter, 
 
 
 def _defect(read: Callable[[Path], object], path: Path, counts: Counter) -> str | None:
-    signal.signal(signal.SIGALRM, _too_long)
+    before = signal.signal(signal.SIGALRM, _too_long)
     signal.alarm(SECONDS)
     try:
         with warnings.catch_warnings():
@@ -347,6 +347,7 @@ def _defect(read: Callable[[Path], object], path: Path, counts: Counter) -> str 
         return f"{type(error).__name__} at {Path(last.filename).name}:{last.lineno}: {error!s:.80}"
     finally:
         signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
     return None
 
 

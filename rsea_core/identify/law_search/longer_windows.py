@@ -20,6 +20,7 @@ from rsea_core.identify.multistep.criteria import (
     HORIZONS,
     KEPT_RATIO,
     LOST,
+    NO_PREDICTION,
     NOT_BEYOND,
     PER_VALUE,
     RIVAL_SCALE,
@@ -44,6 +45,13 @@ def lengthened(found: Found, say, *, quick: bool = False) -> None:
     before = found.horizon
     if not quick:
         _brought_near(found, say)
+    lengthen(found, say, quick=quick)
+    if found.horizon != before and not quick:
+        _rank_again(found, say)
+
+
+def lengthen(found: Found, say, *, quick: bool = False) -> None:
+    """Longer windows, as long as the laws predict these in the noise that they leave."""
     while found.horizon is not None:
         at = HORIZONS.index(found.horizon)
         trial = found.estimator.having(with_windows(found.estimator, HORIZONS[at + 1]))
@@ -59,11 +67,13 @@ def lengthened(found: Found, say, *, quick: bool = False) -> None:
             break
         smooth(trial, h, fit.x)
         trial = with_noise(trial.having([prepared(t) for t in trial.tracks]), h, fit.x)
-        best = trial.fit(h, fit.x, iterations=4)
-        found.estimator, found.best = settled(trial, best, once=quick)
+        own, best = settled(trial, trial.fit(h, fit.x, iterations=4), once=quick)
+        error = relative_error(own, h, best.x)
+        if error > NO_PREDICTION:  # in its own noise unknown torques explain what values did
+            say(f"  in the noise that it leaves: {error:.3g}; shorter windows stay")
+            break
+        found.estimator, found.best = own, best
         found.horizon = HORIZONS[at + 1]
-    if found.horizon != before and not quick:
-        _rank_again(found, say)
 
 
 def _brought_near(found: Found, say) -> None:

@@ -155,7 +155,7 @@ def add_all(
 
 def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
     """Add law after law, with longer windows as far as they allow."""
-    while len(found.steps) < LAWS and not (found.steps and no_work_left()):
+    while len(found.steps) < LAWS:
         step = _next_law(found, laws, say, quick=quick)
         if step is None:
             break

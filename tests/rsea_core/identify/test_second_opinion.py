@@ -8,6 +8,7 @@ import pytest
 
 from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose
 from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.window_diagnosis import CURTAILED
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 HERE = "rsea_core.identify.diagnose"
@@ -22,7 +23,7 @@ def opinion(error: float, alone: float):
     found = SimpleNamespace(complete=False, explained=0.0)
     doubtful = SimpleNamespace(found=found, estimator=SimpleNamespace(tempering=0.1))
     document = {"verdict": "missing-physics", "fit": {"recordings": rows}, "effects": []}
-    return SimpleNamespace(document=document, conclusion=doubtful)
+    return SimpleNamespace(document=document, conclusion=doubtful, findings=())
 
 
 @pytest.mark.parametrize(
@@ -45,6 +46,17 @@ def test_free_runs_replace_windows_only_where_they_predict_clearly_better(
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
     assert diagnose(case) is opinions[taken]
+
+
+def test_no_second_opinion_is_asked_where_the_work_was_limited(tmp_path, monkeypatch):
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    held_out = replace(case.recordings[0], role="validation")
+    case = replace(case, recordings=(*case.recordings, held_out))
+    first = opinion(0.3, 3.0)
+    first.findings = (CURTAILED,)
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: first)
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinion(0.1, 3.0))
+    assert diagnose(case) is first
 
 
 @pytest.mark.parametrize(

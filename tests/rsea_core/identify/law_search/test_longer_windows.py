@@ -61,3 +61,20 @@ def test_laws_that_predict_recordings_held_out_evenly_need_not_hold_in_longer_wi
 ):
     found, _ = found_with(monkeypatch, 1.0, 0.5, left)
     assert fails_in_longer_windows(found, HeldOut(gain=30.0, ratio=ratio)) == no_further
+
+
+@pytest.mark.parametrize(("settles_at", "horizon"), [(0.1, None), (5.0, 16.0)])
+def test_windows_are_not_taken_in_which_a_fit_in_its_own_noise_predicts_nothing(
+    monkeypatch, settles_at, horizon
+):
+    """Free turret, 29001 s18: an error of 0.18 became 5 where unknown torques were estimated."""
+    found, _ = found_with(monkeypatch, 16.0, 0.5, 0.1)
+    end = SimpleNamespace(error=settles_at)
+    found.lost, found.best = longer_windows.LOST, SimpleNamespace(hypothesis=None, x=np.zeros(1))
+    found.estimator.tracks = []
+    monkeypatch.setattr(longer_windows, "smooth", lambda *given: None)
+    monkeypatch.setattr(longer_windows, "with_noise", lambda own, h, x: own)
+    monkeypatch.setattr(longer_windows, "settled", lambda own, fit, once: (end, fit))
+    longer_windows.lengthen(found, lambda text: None)
+    assert found.horizon == horizon
+    assert (found.estimator is end) == (horizon is None)
