@@ -11,7 +11,6 @@ from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.search import begun
 from rsea_core.identify.multistep.command_timing import CommandTiming
 from rsea_core.identify.whole_runs.complete import begins_no_better, laws_added, of_first_growth
-from rsea_core.numeric.work_limit import limited_work
 from rsea_core.recordings.case import Case
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -99,15 +98,8 @@ def test_another_growth_gains_nothing_unless_whole_recordings_are_likelier_with_
     assert not begins_no_better(search, linear)
 
 
-def test_a_search_with_little_work_ends_early_and_the_diagnosis_states_it(tmp_path, monkeypatch):
-    """Two steps in the place of a search: nothing further is begun after the first growth."""
-    case = axis(tmp_path)
-    with limited_work(1.0) as work:
-        found = investigate(case)
-    assert work.curtailed
-    assert found.base.arrived or found.complete
+def test_a_diagnosis_whose_work_is_limited_states_it(tmp_path, monkeypatch):
     monkeypatch.setattr(window_diagnosis, "MOST_WORK", 1.0)
-    texts = [f.text for f in window_diagnosis.diagnose_windows(case).findings]
-    assert window_diagnosis.CURTAILED.text in texts
-    texts = [f.text for f in window_diagnosis.diagnose_windows(case, thorough=True).findings]
-    assert window_diagnosis.CURTAILED.text not in texts
+    found = window_diagnosis.diagnose_windows(axis(tmp_path))
+    assert window_diagnosis.CURTAILED in found.findings
+    assert found.document["effects"][0]["name"] == LoadFriction.effect
