@@ -30,7 +30,7 @@ QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
-MOST_WORK, BRIEF_WORK = 2e8, 2e7  # simulated rows, after which a search begins nothing further
+MOST_WORK = 2e8  # simulated rows of a search, after which it begins nothing further
 CURTAILED = Finding(
     kind=Kind.METHOD,
     text="the recordings are long: further searches were left out, which could find other laws"
@@ -64,8 +64,7 @@ def diagnose_windows(
     if quick:
         most = max(BRIEF_ROWS, BRIEF_ROWS_OF_EACH * len(case.identification))
         case, cut = truncate(case, np.inf, most, reason="without --quick all rows are")
-    most_work = BRIEF_WORK if quick else np.inf if thorough else MOST_WORK
-    with limited_work(most_work) as work:
+    with limited_work(np.inf if thorough else MOST_WORK) as work:
         found = investigate(case, quick=quick, say=say)
     say(f"work: {work.done:.3g} simulated rows")
     conclusion = WindowVerdict(found, case, say)
