@@ -14,7 +14,7 @@ from rsea_core.numeric.threads import share_out
 
 LEAST_PIVOT = 1e-9  # of a variance that is left of a reading when others are known
 LANES = 8  # residuals whitened side by side
-SETTLED = 1e-6  # relative change of gains from row to row, below which they stay
+SETTLED = 1e-10  # relative change of gains from row to row, below which they stay
 HUBER = 4.0  # innovations beyond so many deviations count linearly
 
 
