@@ -319,8 +319,7 @@ def _finished(
     Those at a bound are listed apart, and so is the best of those whose fit ended at their absence.
     """
     estimator, base, short = found.estimator, found.best, choice.short
-    shared = estimator.jacobian(base.hypothesis, base.x)[1]
-    rough = [(c, fitted(estimator, base, c, short, shared=shared)) for c in choice.candidates]
+    rough = [(c, fitted(estimator, base, c, short)) for c in choice.candidates]
     rough.sort(key=lambda pair: pair[1].cost)
     most = FEWER_FINISHED if quick else FINISHED
     chosen = rough[:most] + [pair for pair in rough[most:] if pair[0].law.key in choice.apart]
