@@ -35,7 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     speed.add_argument(
         "--quick", action="store_true", help="fewer fits of fewer rows, brief report"
     )
-    speed.add_argument("--thorough", action="store_true", help="finer steps, no early stopping")
+    speed.add_argument("--thorough", action="store_true", help="finer steps, no limit of work")
     parser.add_argument("--json", action="store_true", help="print the diagnosis as JSON")
     parser.add_argument("--force", action="store_true", help="overwrite existing files")
     parser.add_argument("-v", "--verbose", action="store_true", help="print each fit as it is made")

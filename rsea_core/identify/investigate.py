@@ -114,7 +114,7 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
     if end is not None and not doubted:
         return end, None
     if timing is not None and not no_work_left():
-        say("searched again: with what whole recordings show, commands act at other times")
+        say("searched again: whole recordings are likelier with commands at other times")
         other, _ = in_other_timing(search, timing, say)
         if other.complete or other.sound:
             return other, None
@@ -122,7 +122,7 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
         return concluded(found, search, say)
     again = from_growth(grown_again(first, case, say), say)
     if search.left() > search.enough and begins_no_better(search, again):
-        say("whole recordings: no likelier so; the laws added before stand")
+        say("whole recordings are no likelier with it: the laws added before stand")
         found, nearly = concluded(found, search, say)
         return (found if found.complete or found.sound else found.in_windows_of(again)), nearly
     found, nearly = concluded(*laws_added(again, say), say)

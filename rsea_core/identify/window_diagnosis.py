@@ -33,8 +33,8 @@ QUICK_LOOK = Finding(
 MOST_WORK = 2e8  # simulated rows of a search, after which it begins nothing further
 CURTAILED = Finding(
     kind=Kind.METHOD,
-    text="the recordings are long: further searches were left out, which could find other laws"
-    " (--thorough makes them)",
+    text="the search reached its limit of work: further searches, which could find other laws, were"
+    " left out (--thorough has no limit)",
 )
 OF_THE_LOG = (CLOCK, FILTER, RATIO)
 OFFSET_SHOWN = 3.0  # deviations from which an amplifier's offset is stated

@@ -70,7 +70,7 @@ def lengthen(found: Found, say, *, quick: bool = False) -> None:
         own, best = settled(trial, trial.fit(h, fit.x, iterations=4), once=quick)
         error = relative_error(own, h, best.x)
         if error > NO_PREDICTION:  # in its own noise unknown torques explain what values did
-            say(f"  in the noise that it leaves: {error:.3g}; shorter windows stay")
+            say(f"  settled in its own noise: {error:.3g}; the shorter windows are kept")
             break
         found.estimator, found.best = own, best
         found.horizon = HORIZONS[at + 1]

@@ -13,7 +13,7 @@ from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, hub
 from rsea_core.identify.multistep.steps import (
     Start,
     largest_decrease,
-    least_fall,
+    least_decrease,
     normal,
     stepped,
 )
@@ -232,9 +232,9 @@ class Estimator:
             if needed > 0.0 and needed > largest_decrease(self, h, x, level, columns):
                 break
             begin = Start(h, x, cost, *normal(self, h, x, level, columns))
-            end = stepped(self, begin, level, columns, damping, fine=fine, whole=shared is None)
+            end = stepped(self, begin, level, columns, damping, fine=fine, all_new=shared is None)
             if shared is not None:
-                little = cost - end.cost < least_fall(cost)
+                little = cost - end.cost < least_decrease(cost)
                 shared = None if little else [J[: len(s)] for J, s in zip(end.columns, shared)]
             x, cost, damping, arrived, _ = end
             taken += 1

@@ -211,20 +211,20 @@ class End(NamedTuple):
     columns: list[NDArray]
 
 
-def least_fall(cost: float, fine: bool = False) -> float:
-    """Fall of a cost below which a fit has arrived."""
+def least_decrease(cost: float, fine: bool = False) -> float:
+    """Decrease of a cost below which a fit has arrived."""
     return max(0.0 if fine else ENOUGH * abs(cost), NEGLIGIBLE)
 
 
 def stepped(
     own: Fitted, begin: Start, level: list[NDArray], columns: list[NDArray], damping: float, *,
-    fine: bool, whole: bool,
+    fine: bool, all_new: bool,
 ) -> End:  # fmt: skip
     """Steps with one Jacobian, which each corrects, as long as the cost falls as foreseen.
 
     Parameters
     ----------
-    whole : bool
+    all_new : bool
         Whether all of the Jacobian is new; if not, a fit has not arrived where it gains nothing.
     """
     h, x, cost, A, g = begin
@@ -233,13 +233,13 @@ def stepped(
         if not fresh:
             A, g = normal(own, h, x, level, columns)
         step, damping = best_step(own, h, x, cost, A, g, damping, fresh)
-        if fresh and whole:
+        if fresh and all_new:
             step = along_valley(own, begin, level, columns, step)
         if step is None:
-            return End(x, cost, damping, fresh and whole, columns)
+            return End(x, cost, damping, fresh and all_new, columns)
         moved, fall = step.x - x, cost - step.cost
-        little = fall < least_fall(cost, fine)
-        arrived = fresh and whole and little
+        little = fall < least_decrease(cost, fine)
+        arrived = fresh and all_new and little
         if fresh and fall < NEGLIGIBLE:  # the next fit begins where a Jacobian is known
             return End(x, cost, damping, arrived, columns)
         foreseen = -float(g @ moved + 0.5 * moved @ A @ moved)

@@ -134,7 +134,7 @@ def _laws_added(
         other = with_single_zeros(found, own, search.fit, say)
         if other is not found:
             return laws_added(other, say, effects=effects)
-    rival = None if found.sound or no_work_left() else begun_with_rival(search, say)
+    rival = None if found.sound else begun_with_rival(search, say)
     return found, rival or search
 
 
@@ -144,7 +144,7 @@ def concluded(
     """What laws added to parameters alone show, as `with_whole_runs`."""
     if found.needs_no_law:
         return found, None
-    if not found.sound and not no_work_left():
+    if not found.sound:
         search = search.begun_at_bound(say) or search
     if search.left() <= search.enough:
         finished = _finished(found, search, say, again=again)
@@ -154,8 +154,8 @@ def concluded(
         return found, None
     found = replace(found, explained_once=explained_once(search))
     nearly = nearly_complete(found, search, say)
-    again = again and not no_work_left()
-    other = _with_other_timing(search, say) if again and search.taken else None
+    again = again and bool(search.taken) and not no_work_left()
+    other = _with_other_timing(search, say) if again else None
     if other is not None and (other[0].complete or (other[1] is not None and nearly is None)):
         return other
     return (found if nearly else replace(found, by_whole_runs=first_law(found, search))), nearly
@@ -210,8 +210,7 @@ def _finished(
     if other is not None:
         return other
     search.refine(say)
-    if not no_work_left():
-        search.seek_rivals(say)
+    search.seek_rivals(say)
     search.compare(say)
     search.predict(say)
     say(f"whole recordings: laws taken leave {search.excess():.0f} units more than noise")

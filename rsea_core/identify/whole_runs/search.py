@@ -61,6 +61,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
 from rsea_core.identify.whole_runs.short_rivals import rivals_of_short_windows
 from rsea_core.identify.whole_runs.taken_laws import SIZES, TakenLaws, Trial, best_of_each_effect
 from rsea_core.identify.whole_runs.unseen import needed, unseen_share, without
+from rsea_core.numeric.work_limit import no_work_left
 
 
 class WholeSearch(TakenLaws):
@@ -170,10 +171,8 @@ class WholeSearch(TakenLaws):
         for c in candidates:
             gained = max((t.gain for t in found), default=0.0)
             target = start.cost - LEAST_OF_BEST * gained if gained > 0.0 else np.inf
-            fit = fitted(
-                own, start, c, factors=SIZES, iterations=iterations, target_cost=target,
-                shared=shared,
-            )  # fmt: skip
+            limits = {"iterations": iterations, "target_cost": target}
+            fit = fitted(own, start, c, factors=SIZES, shared=shared, **limits)
             fit = fit if own is self.own else with_costs_of(self.own, fit)
             gain = base.cost - fit.cost - PER_VALUE * count_values(c.law)
             if np.isfinite(gain):
@@ -204,7 +203,7 @@ class WholeSearch(TakenLaws):
         if self.best_at_bound is None or self.left() <= self.enough:
             return None
         unexplained = excess(self.own, self.plain.hypothesis, self.plain.x)
-        if self.best_at_bound.gain < NEARLY_EXPLAINED * unexplained:
+        if self.best_at_bound.gain < NEARLY_EXPLAINED * unexplained or no_work_left():
             return None
         other = WholeSearch(self.own, self.plain, self.found, self.laws, self.enough)
         first = self.continued(self.best_at_bound)
@@ -239,7 +238,7 @@ class WholeSearch(TakenLaws):
 
     def seek_rivals(self, say) -> None:
         """If the only law leaves more than noise, add rivals that were fitted in short windows."""
-        if len(self.taken) != 1 or self.excess() < LEAST_EXCESS:
+        if len(self.taken) != 1 or self.excess() < LEAST_EXCESS or no_work_left():
             return
         law = self.taken[0]
         others = [w for w in self.laws if (w.effect, w.sensor) != (law.effect, law.sensor)]
@@ -324,7 +323,7 @@ def begun_with_rival(search: WholeSearch, say) -> WholeSearch | None:
         return None
     others = [t for t in first[1:] if t.law.only is None]
     for t in others[:FIRST_RIVALS]:
-        if t.gain < CLOSE_FIRST * first[0].gain:
+        if t.gain < CLOSE_FIRST * first[0].gain or no_work_left():
             break
         say(
             f"  whole recordings: searched again from {t.law.key}, which alone gains nearly as much"
@@ -355,8 +354,8 @@ def _converged(search: WholeSearch, law: Law, trials: Sequence[Trial]) -> list[T
             fit = converged(search.own, fit.hypothesis, fit.x)
             if fit.cost < search.fit.cost + search.doubt():  # as near to the rig file as the law's
                 fit = refitted_from_rig(search.own, fit)
-        gain = search.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
         left = misfit(search.own, fit.hypothesis, fit.x)
+        gain = search.plain.cost - fit.cost - PER_VALUE * count_values(t.law)
         found.append(replace(t, fit=fit, gain=gain, left=left))
     return sorted(found, key=lambda t: -t.gain)
 
@@ -387,14 +386,14 @@ def plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     doubt = max(doubt, ALIKE_OF_GAIN * best.gain)
     alike = [t for t in trials if worth(t) > worth(best) - doubt]
 
-    def form(t: Trial) -> tuple[bool, bool, int]:
+    def complexity(t: Trial) -> tuple[bool, bool, int]:
         of_angle = t.law.effect == SensorScale.effect and t.law.sensor in ANGLES
         return t.law.effect == DriveDeadZone.effect, of_angle, count_values(t.law)
 
     def cost(t: Trial) -> float:
         return PRIOR_AMONG_ALIKE * t.fit.prior_cost - t.gain
 
-    plain = [t for t in alike if form(t) == min(map(form, alike))]
+    plain = [t for t in alike if complexity(t) == min(map(complexity, alike))]
     least = min(map(cost, plain))
     same = [t for t in plain if cost(t) < least + SAME_END]
     return min(same, key=lambda t: (t.law.subsystem != "load", cost(t)))

@@ -65,7 +65,7 @@ def test_complete_laws_are_searched_again_in_the_same_windows_where_another_timi
     monkeypatch.setattr(investigate_module, "of_first_growth", held)
     lines = []
     assert_friction(investigate(axis(tmp_path), say=lines.append))
-    assert any("commands act at other times" in line for line in lines)
+    assert any("with commands at other times" in line for line in lines)
     assert not grown
 
 
@@ -98,8 +98,17 @@ def test_another_growth_gains_nothing_unless_whole_recordings_are_likelier_with_
     assert not begins_no_better(search, linear)
 
 
-def test_a_diagnosis_whose_work_is_limited_states_it(tmp_path, monkeypatch):
+def test_a_search_that_is_left_out_for_the_limit_of_work_is_stated(tmp_path, grown, monkeypatch):
+    """Complete laws in doubt; without doubt nothing is left out and nothing stated."""
     monkeypatch.setattr(window_diagnosis, "MOST_WORK", 1.0)
-    found = window_diagnosis.diagnose_windows(axis(tmp_path))
+    case = axis(tmp_path)
+    assert window_diagnosis.CURTAILED not in window_diagnosis.diagnose_windows(case).findings
+
+    def doubted(*given):
+        return of_first_growth(*given)._replace(timing=None, doubted=True)
+
+    monkeypatch.setattr(investigate_module, "of_first_growth", doubted)
+    found = window_diagnosis.diagnose_windows(case)
     assert window_diagnosis.CURTAILED in found.findings
     assert found.document["effects"][0]["name"] == LoadFriction.effect
+    assert not grown
