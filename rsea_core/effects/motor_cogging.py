@@ -153,7 +153,8 @@ def linear_motor_cogging(typical: TypicalMagnitudes) -> list[Law]:
     return with_harmonic(
         Law(effect="motor-cogging", law="free pitch", subsystem="gear", unknowns=(*first, pitch),
             starts=tuple((0.1 * ripple, 0.0, float(c)) for c in wave_numbers),
-            write=_write, kind=MotorCogging, parameters=_parameters)
+            write=_write, kind=MotorCogging, parameters=_parameters,
+            follows=True)  # screened along the motion
     )  # fmt: skip
 
 

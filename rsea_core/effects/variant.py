@@ -222,6 +222,11 @@ class Law:
         place = self.sensor or self.only
         return f"{self.effect}/{self.law}" + (f"@{place}" if place else "")
 
+    @property
+    def fixed_numbers(self) -> dict[str, float]:
+        """Numbers that no fit changes."""
+        return {p.name: p.low for p in self.unknowns if p.low == p.high}
+
     def term(self, values: Values, rig: Rig, **more: float | str) -> Term:
         """The effect with these values, its bounds unchecked: a fit's are the unknowns' own.
 

@@ -15,10 +15,14 @@ import numpy as np
 from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.found import Found, from_growth
-from rsea_core.identify.law_search.gear_mesh import encoders_disagree, with_gear_mesh
+from rsea_core.identify.law_search.gear_mesh import (
+    encoders_disagree,
+    shows_lost_motion,
+    with_gear_mesh,
+)
 from rsea_core.identify.law_search.hold_out import with_pause_shown, with_shared_recordings
 from rsea_core.identify.law_search.search import add_all, begun, laws_of, searched
-from rsea_core.identify.law_search.shorter_windows import in_shorter_windows, predicts_closer
+from rsea_core.identify.law_search.window_lengths import in_shorter_windows, predicts_closer
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     DOUBTED_SHARE,
@@ -47,6 +51,7 @@ from rsea_core.identify.whole_runs.complete import (
 from rsea_core.identify.whole_runs.parameters_alone import found_sound
 from rsea_core.identify.whole_runs.sensor_noise import (
     in_noise_left_by,
+    in_sensor_noise,
     misfit,
     refitted_from_rig,
 )
@@ -69,6 +74,28 @@ def investigate(
     case, shared = with_shared_recordings(recorded)
     for file, why in shared.items():
         say(f"{file}: two thirds are fitted: {why}")
+    found = None if quick else _with_lost_motion(case, say)
+    if found is None:
+        found, shared = _searched(case, recorded, shared, say, quick=quick)
+    found.shared = shared
+    if not quick:
+        found.continue_from(found.estimator, refitted_from_rig(found.estimator, found.best))
+    best = found.best
+    _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
+    found.best, found.pause_shown = replace(best, x=x), x is not best.x
+    return found
+
+
+def _searched(
+    case: Case, recorded: Case, shared: dict[str, str], say, *, quick: bool
+) -> tuple[Found, dict[str, str]]:
+    """What whole recordings show, or else windows, and which recordings were shared.
+
+    Parameters
+    ----------
+    case, recorded : Case
+        As searched, with `shared` recordings fitted by two thirds, and as given.
+    """
     nearly = None
     if quick:
         found = found_sound(begun(case, None, say, quick=True), say)
@@ -89,13 +116,7 @@ def investigate(
         found = _in_doubt(case, found, say, quick=brief)
         if not quick:
             found = confirmed_by_whole_runs(found, nearly, say)
-    found.shared = shared
-    if not quick:
-        found.continue_from(found.estimator, refitted_from_rig(found.estimator, found.best))
-    best = found.best
-    _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
-    found.best, found.pause_shown = replace(best, x=x), x is not best.x
-    return found
+    return found, shared
 
 
 def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
@@ -130,6 +151,23 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
         say("whole recordings: the laws of the first growth of windows are complete")
         return end, None
     return found, nearly
+
+
+def _with_lost_motion(case: Case, say) -> Found | None:
+    """The search with the gear's mesh as a spring, where the encoders alone show lost motion.
+
+    None where they do not, or where windows show no backlash.
+    """
+    elastic = with_gear_mesh(case) if shows_lost_motion(case) else None
+    if elastic is None:
+        return None
+    say("the encoders show lost motion in a train without a spring: with an elastic gear mesh")
+    found = searched(elastic[0], None, say, mesh=elastic[1])
+    if not any(step.law.effect == GearBacklash.effect for step in found.steps):
+        return None
+    own = in_sensor_noise(found.base_estimator, found.base)
+    left = misfit(own, found.base.hypothesis, found.base.x)
+    return confirmed_by_whole_runs(replace(found, left_by_parameters=left), None, say)
 
 
 def _in_doubt(case: Case, found: Found, say, *, quick: bool) -> Found:

@@ -17,8 +17,8 @@ from rsea_core.identify.judgement.unmodelled_gravity import gravity_entry
 from rsea_core.identify.law_search.candidate_fits import count_values
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.hold_out import HeldOut, beyond_chance, free_run
-from rsea_core.identify.law_search.longer_windows import fails_in_longer_windows
 from rsea_core.identify.law_search.shape_search import Shape
+from rsea_core.identify.law_search.window_lengths import fails_in_longer_windows
 from rsea_core.identify.multistep.criteria import (
     DEPENDENT,
     DOUBTED_ERROR,

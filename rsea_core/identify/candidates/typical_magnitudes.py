@@ -47,12 +47,12 @@ def own_magnitudes(case: Case) -> TypicalMagnitudes:
         max((float(np.std(r["torque_Nm"])) for r in some if "torque_Nm" in r), default=0.0)
         for some in (free, case.identification)
     )
-    load = max(moved, taken) or drive or 1e-300
-    if not rig.spring_stiffness_Nm_per_rad:  # one body: what the drive pushes against, unknown too
-        load = max(load, drive)
+    deflection = max((_deflection(r, N) for r in case.identification), default=0.0)
+    sprung = (rig.spring_stiffness_Nm_per_rad or 0.0) * deflection
+    # what the drive pushes against is unknown too: the friction of a slow load moves nothing
+    load = max(moved, taken, min(drive, sprung) if sprung else drive) or 1e-300
     drive = drive or load
     K = rig.spring_stiffness_Nm_per_rad or load / angle
-    deflection = max((_deflection(r, N) for r in case.identification), default=0.0)
     kt = rig.torque_constant_Nm_per_A or 1.0
     return TypicalMagnitudes(
         torque_Nm=read or load, motor_torque_Nm=drive / N, current_A=drive / N / kt,

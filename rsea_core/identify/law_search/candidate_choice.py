@@ -16,6 +16,7 @@ from rsea_core.effects.variant import Law
 from rsea_core.identify.candidates.catalogue import of_one_body
 from rsea_core.identify.law_search.candidate_fits import by_output_error, close_to_rig, far_from_rig
 from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.order_analysis import along_motion
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen
 from rsea_core.identify.multistep.criteria import (
@@ -65,7 +66,8 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
     short = None
     if found.horizon is None or found.horizon > SHORT:
         short = estimator.having(with_windows(estimator, SHORT))
-    chosen = standing_out(screened, estimator.tempering)
+    orders = along_motion(Projection(estimator, base), left)
+    chosen = standing_out(_by_held_out([*screened, *orders]), estimator.tempering)
     once = any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws)
     if not (once or (quick and not first)):  # a second law needs the test by whole recordings
         chosen += pulses(Projection(without_slow_torque(estimator), base))[:PULSES]
@@ -126,6 +128,10 @@ def _new(candidates: Sequence[Candidate], chosen: Sequence[Candidate]) -> list[C
 
 def _from(fit: Estimate, candidates: Sequence[Candidate]) -> list[Candidate]:
     return [replace(c, start_values=fit.x) for c in candidates]
+
+
+def _by_held_out(candidates: Sequence[Candidate]) -> list[Candidate]:
+    return sorted(candidates, key=lambda c: -c.held_out)
 
 
 def standing_out(screened: Sequence[Candidate], tempering: float) -> list[Candidate]:

@@ -18,7 +18,8 @@ from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.multistep.criteria import DISAGREE, MESH_ROWS, MESH_TOLERANCE
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.machine.rig import Rig
-from rsea_core.recordings.case import Case
+from rsea_core.recordings.case import Case, noise_floor
+from rsea_core.recordings.recording import Recording
 
 BOTH = ("motor_angle_rad", "load_angle_rad")
 DAMPING_RATIO = 0.2  # of the mesh, before a fit
@@ -33,6 +34,33 @@ def encoders_disagree(found: Found) -> bool:
             if np.any(t.noise.of_readings[at] > DISAGREE * e.floor_of_each[at]):
                 return True
     return False
+
+
+def shows_lost_motion(case: Case) -> bool:
+    """Whether the readings alone show backlash in a train without a spring, before any fit.
+
+    The encoders then differ by more than noise, and by neither an offset, a factor, a late reading
+    nor waves over the turns of wheel and worm, as a transmission error has.
+    """
+    rig = case.rig
+    if rig.has("spring") or not rig.has("gear"):
+        return False
+    read = [r for r in case.identification if all(n in r and n not in r.derived for n in BOTH)]
+    return any(_left_by_waves(r, rig) > DISAGREE for r in read)
+
+
+def _left_by_waves(r: Recording, rig: Rig) -> float:
+    """Difference of the angles that a rigid train with a transmission error leaves, in floors."""
+    ratio = rig.gear_ratio or 1.0
+    wheel = r["motor_angle_rad"] / ratio
+    smooth = [np.ones_like(wheel), wheel, np.gradient(wheel, r.time_s)]
+    orders = (1.0, 2.0, ratio, 2.0 * ratio)
+    waves = [wave(n * wheel) for n in orders for wave in (np.sin, np.cos)]
+    columns, difference = np.stack([*smooth, *waves], axis=1), r["load_angle_rad"] - wheel
+    left = difference - columns @ np.linalg.lstsq(columns, difference, rcond=None)[0]
+    floors = noise_floor(rig, r)
+    floor = np.hypot(floors["load_angle_rad"], floors["motor_angle_rad"] / ratio)
+    return float(np.std(left) / floor)
 
 
 def with_gear_mesh(case: Case) -> tuple[Case, tuple[Law, ...]] | None:

@@ -40,7 +40,6 @@ from rsea_core.identify.law_search.candidate_fits import (
 )
 from rsea_core.identify.law_search.found import Entry, Found, Step, from_growth
 from rsea_core.identify.law_search.gear_mesh import first_laws
-from rsea_core.identify.law_search.longer_windows import lengthened
 from rsea_core.identify.law_search.pruning import pruned, without_weak_end
 from rsea_core.identify.law_search.pulses import pulse_ratio
 from rsea_core.identify.law_search.richer_laws import (
@@ -50,6 +49,7 @@ from rsea_core.identify.law_search.richer_laws import (
 )
 from rsea_core.identify.law_search.screening import Candidate, Projection
 from rsea_core.identify.law_search.shape_search import shapes
+from rsea_core.identify.law_search.window_lengths import lengthened
 from rsea_core.identify.multistep.command_timing import CommandTiming
 from rsea_core.identify.multistep.criteria import (
     AGAIN,

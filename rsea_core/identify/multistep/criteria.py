@@ -120,7 +120,6 @@ NEARLY_EXPLAINED = 0.5  # of what other laws leave: a small law from there on is
 NEEDS_NO_WINDOWS = 0.95  # of the same: a law that stands without a search in windows
 MOST_FITTED_RISE = 1.33  # of the rise that insulation bears: a fitted rise is uncertain
 NEIGHBOURS = 4  # of a law with a fixed number, as cycles in a turn: tried in its place
-MANY_STARTS = 20  # of a law: the one that windows show is a start too
 ORDERS = 2  # cycles of cogging in a turn, likeliest along the recorded motion: tried
 QUICK_ITERATIONS, CLOSE_TO_BEST = 3, 0.5  # of laws that a screening puts last; of the best gain
 CLOSE_FIRST, FIRST_RIVALS = 0.9, 2  # share of the first law's gain; rivals tried first

@@ -37,25 +37,20 @@ def holds(law: Law, plainer: Law) -> bool:
     names, fewer = ({p.name for p in w.unknowns} for w in (law, plainer))
     same = (law.effect, law.sensor) == (plainer.effect, plainer.sensor)
     same = same and law.key != plainer.key
-    return same and fewer <= names and fixed_numbers(plainer).items() <= fixed_numbers(law).items()
+    return same and fewer <= names and plainer.fixed_numbers.items() <= law.fixed_numbers.items()
 
 
 def richer_of(law: Law, laws: Sequence[Law]) -> list[Law]:
     """Laws that are tried only in place of one with a number that no fit changes."""
     forms = [w for w in laws if w.follows and w.law in law.richer and holds(w, law)]
-    return forms if fixed_numbers(law) else []
-
-
-def fixed_numbers(law: Law) -> dict[str, float]:
-    """Numbers of a law that no fit changes."""
-    return {p.name: p.low for p in law.unknowns if p.low == p.high}
+    return forms if law.fixed_numbers else []
 
 
 def alike(law: Law, laws: Sequence[Law]) -> list[Law]:
     """Laws that differ from one in a number that no fit changes, the nearest first."""
-    fixed, found = fixed_numbers(law), []
+    fixed, found = law.fixed_numbers, []
     for other in laws:
-        numbers = fixed_numbers(other)
+        numbers = other.fixed_numbers
         names = [p.name for p in other.unknowns] == [p.name for p in law.unknowns]
         same = (other.effect, other.sensor) == (law.effect, law.sensor) and names
         if fixed and same and numbers != fixed and numbers.keys() == fixed.keys():

@@ -11,6 +11,7 @@ import numpy as np
 
 from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.load_disturbance import LoadDisturbance
+from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.candidate_fits import (
@@ -19,6 +20,7 @@ from rsea_core.identify.law_search.candidate_fits import (
     fitted,
     settled,
 )
+from rsea_core.identify.law_search.order_analysis import along_motion
 from rsea_core.identify.law_search.pulses import pulse_ratio, pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen, screen_again
 from rsea_core.identify.multistep.criteria import (
@@ -31,7 +33,6 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_OF_BEST,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
-    MANY_STARTS,
     NEARLY_EXPLAINED,
     NEEDS_NO_WINDOWS,
     NEGLIGIBLE_INCREASE,
@@ -51,7 +52,6 @@ from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.experiment import ANGLES
 from rsea_core.identify.whole_runs.coarse_steps import in_coarse_steps, with_costs_of
 from rsea_core.identify.whole_runs.forms import most_promising, of_other_effects
-from rsea_core.identify.whole_runs.order_analysis import along_motion
 from rsea_core.identify.whole_runs.sensor_noise import (
     converged,
     excess,
@@ -132,7 +132,7 @@ class WholeSearch(TakenLaws):
         projection = Projection(self.own, self.fit)
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(projection)[:PULSES]
-        candidates = most_promising(screened) + self.of_many_starts(left)
+        candidates = most_promising(screened) + self.of_free_pitch(left)
         candidates += along_motion(projection, left)[:ORDERS]
         candidates += of_other_effects(screened, candidates)
         quick = in_coarse_steps(self.own, self.fit, self.left())
@@ -141,13 +141,14 @@ class WholeSearch(TakenLaws):
         trials = [self.continued(t) if t.gain > least else t for t in trials]
         return sorted(trials, key=lambda t: -t.gain)
 
-    def of_many_starts(self, laws: Sequence[Law]) -> list[Candidate]:
-        """Laws whose wave may have any length, begun at the length that windows show.
+    def of_free_pitch(self, laws: Sequence[Law]) -> list[Candidate]:
+        """Waves that may have any length, begun at the length that windows show.
 
         Errors of whole recordings accumulate, so that a wave of almost any length lowers them.
         """
-        laws = [law for law in laws if len(law.starts) > MANY_STARTS]
-        return screen(self.found.base_estimator, self.found.base, laws) if laws else []
+        laws = [law for law in laws if law.kind is MotorCogging and not law.fixed_numbers]
+        in_windows = Projection(self.found.base_estimator, self.found.base) if laws else None
+        return along_motion(in_windows, laws) if laws else []
 
     def fitted(
         self, base: Estimate, candidates: Sequence[Candidate], quick: Estimator | None = None,

@@ -8,11 +8,11 @@ import pytest
 from rsea_core.effects.motor_cogging import MANY_CYCLES, MotorCogging
 from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.order_analysis import along_motion
 from rsea_core.identify.law_search.screening import Projection, screen, screen_again
 from rsea_core.identify.law_search.search import laws_of
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.timing_choice import parameters_with_timing
-from rsea_core.identify.whole_runs.order_analysis import along_motion
 from rsea_core.identify.whole_runs.search import WholeSearch
 from rsea_core.identify.whole_runs.sensor_noise import in_sensor_noise
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig

@@ -10,8 +10,11 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.sentences import effect_text
 from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.candidate_choice import promising
 from rsea_core.identify.law_search.candidate_fits import fitted
-from rsea_core.identify.law_search.screening import screen
+from rsea_core.identify.law_search.found import Found
+from rsea_core.identify.law_search.order_analysis import along_motion
+from rsea_core.identify.law_search.screening import Projection, screen
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.identify.multistep.log_nuisances import nuisances
@@ -58,10 +61,28 @@ def test_the_pitch_is_found(case):
     problem = MultistepProblem(case)
     own, base, _ = parameters(problem, Hypothesis(laws=nuisances(case)), lambda text: None)
     law = catalogue(problem.case, relative=True)["motor-cogging/free pitch"]
-    fit = fitted(own, base, screen(own, base, [law])[0])
+    fit = fitted(own, base, along_motion(Projection(own, base), [law])[0])
     values = problem.values(fit.hypothesis, fit.x)[1][-1]
     assert values["cycles_per_rev"] == pytest.approx(7.3, rel=0.01)
     assert np.hypot(values["sin_Nm"], values["cos_Nm"]) == pytest.approx(0.05, rel=0.1)
+
+
+def test_a_strong_wave_is_found_along_the_recorded_motion_and_not_by_the_simulated_one(tmp_path):
+    """The simulated angle leaves the recorded one by waves within a window."""
+    cogging = MotorCogging(amplitude_Nm=0.3, cycles_per_rev=20.0, phase_rad=0.4)
+    strong = axis_case(tmp_path, axis_recording(cogging, seed=1), rig=LINEAR)
+    own, base, horizon = parameters(
+        MultistepProblem(strong), Hypothesis(laws=nuisances(strong)), lambda text: None
+    )
+    found = Found(problem=own.problem, base_estimator=own, base=base, estimator=own, best=base,
+                  horizon=horizon)  # fmt: skip
+    law = catalogue(strong, relative=True)["motor-cogging/free pitch"]
+    by_engine = screen(own, base, [replace(law, follows=False)])[0]
+    (candidate,) = [c for c in promising(found, [law], quick=True).candidates if c.law is law]
+    assert candidate.held_out > 10.0 * by_engine.held_out
+    sine, cosine, cycles = candidate.start
+    assert cycles == pytest.approx(20.0, rel=0.02)
+    assert np.hypot(sine, cosine) == pytest.approx(0.3, rel=0.2)
 
 
 def test_the_sentence_states_the_pitch_in_millimetres():

@@ -16,6 +16,7 @@ from rsea_core.identify.law_search.gear_mesh import (
     as_effect,
     encoders_disagree,
     first_laws,
+    shows_lost_motion,
     with_gear_mesh,
 )
 from rsea_core.identify.multistep.criteria import SEARCH_STEPS
@@ -109,6 +110,20 @@ def parameters_alone(case, more=()) -> Found:
 def test_encoders_of_a_rigid_train_disagree_with_backlash_alone(cases):
     assert encoders_disagree(parameters_alone(cases[WIDTH]))
     assert not encoders_disagree(parameters_alone(cases[0.0]))
+
+
+@pytest.mark.parametrize("amplitude", [0.0, 0.01])
+def test_the_readings_of_a_rigid_train_show_lost_motion_and_not_a_transmission_error(
+    cases, amplitude
+):
+    for width, case in cases.items():
+        (recording,) = case.recordings
+        wheel = recording["motor_angle_rad"] / RATIO
+        moved = recording["load_angle_rad"] + amplitude * np.sin(2.0 * wheel + 0.4)
+        columns = dict(recording.columns) | {"load_angle_rad": moved}
+        assert shows_lost_motion(
+            replace(case, recordings=(replace(recording, columns=columns),))
+        ) == (width > 0.0)
 
 
 def test_the_mesh_with_both_inertias_has_a_mode_of_four_rows(cases):

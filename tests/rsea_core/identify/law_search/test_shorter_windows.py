@@ -5,7 +5,7 @@ import pytest
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.identify.law_search.screening import screen
 from rsea_core.identify.law_search.search import add_all, begun, laws_of
-from rsea_core.identify.law_search.shorter_windows import in_shorter_windows, predicts_closer
+from rsea_core.identify.law_search.window_lengths import in_shorter_windows, predicts_closer
 from rsea_core.identify.multistep.criteria import DOUBTED_ERROR
 from rsea_core.identify.multistep.horizons import relative_error
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rsea_core.identify.law_search import longer_windows
+from rsea_core.identify.law_search import window_lengths
 from rsea_core.identify.law_search.hold_out import HeldOut
-from rsea_core.identify.law_search.longer_windows import error_left_beyond, fails_in_longer_windows
+from rsea_core.identify.law_search.window_lengths import error_left_beyond, fails_in_longer_windows
 
 
 def found_with(monkeypatch, horizon, plain: float, left: float, *, longer: bool = False):
@@ -20,8 +20,8 @@ def found_with(monkeypatch, horizon, plain: float, left: float, *, longer: bool 
         return own
 
     fit = SimpleNamespace(hypothesis=None, x=np.zeros(1))
-    monkeypatch.setattr(longer_windows, "with_windows", lambda own, length: asked.append(length))
-    monkeypatch.setattr(longer_windows, "relative_error", lambda own, h, x: own.error)
+    monkeypatch.setattr(window_lengths, "with_windows", lambda own, length: asked.append(length))
+    monkeypatch.setattr(window_lengths, "relative_error", lambda own, h, x: own.error)
     found = SimpleNamespace(
         horizon=horizon, predicts_longer=longer, steps=[None], base=fit, best=fit,
         base_estimator=estimator(plain), estimator=estimator(left), complete=False,
@@ -70,11 +70,11 @@ def test_windows_are_not_taken_in_which_a_fit_in_its_own_noise_predicts_nothing(
     """Free turret, 29001 s18: an error of 0.18 became 5 where unknown torques were estimated."""
     found, _ = found_with(monkeypatch, 16.0, 0.5, 0.1)
     end = SimpleNamespace(error=settles_at)
-    found.lost, found.best = longer_windows.LOST, SimpleNamespace(hypothesis=None, x=np.zeros(1))
+    found.lost, found.best = window_lengths.LOST, SimpleNamespace(hypothesis=None, x=np.zeros(1))
     found.estimator.tracks = []
-    monkeypatch.setattr(longer_windows, "smooth", lambda *given: None)
-    monkeypatch.setattr(longer_windows, "with_noise", lambda own, h, x: own)
-    monkeypatch.setattr(longer_windows, "settled", lambda own, fit, once: (end, fit))
-    longer_windows.lengthen(found, lambda text: None)
+    monkeypatch.setattr(window_lengths, "smooth", lambda *given: None)
+    monkeypatch.setattr(window_lengths, "with_noise", lambda own, h, x: own)
+    monkeypatch.setattr(window_lengths, "settled", lambda own, fit, once: (end, fit))
+    window_lengths.lengthen(found, lambda text: None)
     assert found.horizon == horizon
     assert (found.estimator is end) == (horizon is None)
