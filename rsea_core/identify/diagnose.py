@@ -23,6 +23,7 @@ from rsea_core.identify.multistep.criteria import (
     NEEDS_NO_WINDOWS,
     NO_PREDICTION,
 )
+from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import CURTAILED, diagnose_windows
 from rsea_core.numeric.threads import on_one_blas_thread
@@ -155,10 +156,12 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
 def _is_doubtful(found: Diagnosis) -> bool:
     """Whether the laws found leave innovations that depend on each other, and predict less well.
 
-    Complete laws (docs/diagnosis.md 10.4) are in no doubt.
+    Complete laws (docs/diagnosis.md 10.4) are in no doubt. Free runs know no gear mesh, so that
+    they have no opinion on laws found with one.
     """
     search = found.conclusion.found
-    if search.complete and search.explained > NEEDS_NO_WINDOWS:
+    meshed = any(law.effect == MESH_DAMPER for law in search.best.hypothesis.laws)
+    if meshed or (search.complete and search.explained > NEEDS_NO_WINDOWS):
         return False
     dependent = found.conclusion.estimator.tempering < DOUBTED_SHARE
     return dependent and held_out_error(found) > PREDICTED

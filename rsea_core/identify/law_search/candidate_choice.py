@@ -20,6 +20,8 @@ from rsea_core.identify.law_search.order_analysis import along_motion
 from rsea_core.identify.law_search.pulses import pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen
 from rsea_core.identify.multistep.criteria import (
+    DOUBTED_ERROR,
+    HORIZONS,
     LATE_ROWS,
     LEAST_GAIN,
     PARENT,
@@ -30,7 +32,11 @@ from rsea_core.identify.multistep.criteria import (
     TRIED_SHORT,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
-from rsea_core.identify.multistep.horizons import with_windows, without_slow_torque
+from rsea_core.identify.multistep.horizons import (
+    relative_error,
+    with_windows,
+    without_slow_torque,
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +53,8 @@ class Choice:
     screened : list of Candidate
         All laws, in the windows where they are judged.
     short : Estimator or None
-        In short windows; None where the judged ones are.
+        In shorter windows, in which a fit begins; None where the judged ones are short and the fit
+        before predicts them closely.
     """
 
     candidates: list[Candidate]
@@ -86,7 +93,20 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
     late = [] if quick else _late_readings(found, left)
     apart |= {c.law.key for c in late}
     chosen = late + [c for c in chosen if all(c.law is not other.law for other in late)]
+    short = short or _where_predicted_closely(found)
     return Choice(candidates=chosen, screened=screened, short=short, apart=apart)
+
+
+def _where_predicted_closely(found: Found) -> Estimator | None:
+    """The next shorter windows, if the fit before errs by much in those judged.
+
+    A law over the angle has many minima where the simulated angle is a wave or more away.
+    """
+    own, best = found.estimator, found.best
+    at = HORIZONS.index(found.horizon)
+    if at == 0 or relative_error(own, best.hypothesis, best.x) < DOUBTED_ERROR:
+        return None
+    return own.having(with_windows(own, HORIZONS[at - 1]))
 
 
 def _late_readings(found: Found, laws: Sequence[Law]) -> list[Candidate]:

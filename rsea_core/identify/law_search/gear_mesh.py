@@ -46,17 +46,17 @@ def shows_lost_motion(case: Case) -> bool:
     if rig.has("spring") or not rig.has("gear"):
         return False
     read = [r for r in case.identification if all(n in r and n not in r.derived for n in BOTH)]
-    return any(_left_by_waves(r, rig) > DISAGREE for r in read)
+    return any(_left_by_harmonics(r, rig) > DISAGREE for r in read)
 
 
-def _left_by_waves(r: Recording, rig: Rig) -> float:
+def _left_by_harmonics(r: Recording, rig: Rig) -> float:
     """Difference of the angles that a rigid train with a transmission error leaves, in floors."""
     ratio = rig.gear_ratio or 1.0
     wheel = r["motor_angle_rad"] / ratio
     smooth = [np.ones_like(wheel), wheel, np.gradient(wheel, r.time_s)]
     orders = (1.0, 2.0, ratio, 2.0 * ratio)
-    waves = [wave(n * wheel) for n in orders for wave in (np.sin, np.cos)]
-    columns, difference = np.stack([*smooth, *waves], axis=1), r["load_angle_rad"] - wheel
+    harmonics = [part(n * wheel) for n in orders for part in (np.sin, np.cos)]
+    columns, difference = np.stack([*smooth, *harmonics], axis=1), r["load_angle_rad"] - wheel
     left = difference - columns @ np.linalg.lstsq(columns, difference, rcond=None)[0]
     floors = noise_floor(rig, r)
     floor = np.hypot(floors["load_angle_rad"], floors["motor_angle_rad"] / ratio)

@@ -32,8 +32,8 @@ def along_motion(projection: Projection, laws: Sequence[Law]) -> list[Candidate]
     for law in laws:
         if law.kind is not MotorCogging or [u.name for u in law.unknowns] != [*AMPLITUDES, CYCLES]:
             continue
-        waves = [_with_cycles(projection, law, c) for c in sorted({s[-1] for s in law.starts})]
-        best = max(filter(None, waves), key=lambda c: c.held_out, default=None)
+        tried = [_with_cycles(projection, law, c) for c in sorted({s[-1] for s in law.starts})]
+        best = max(filter(None, tried), key=lambda c: c.held_out, default=None)
         found += [] if best is None else [best]
     return sorted(found, key=lambda c: -c.held_out)
 
