@@ -69,6 +69,9 @@ EFFECTS = {
         {"link_stiffness_Nm_per_rad": 8.0, "outer_fraction": 0.6},
         "time_s", "torque_Nm", PENDULUM,
     ),
+    "load-inertia-variation": (
+        {"cosine_share": 0.6, "cycles_per_rev": 8.0}, "time_s", "torque_Nm", PENDULUM,
+    ),
     "load-friction": ({"coulomb_Nm": 0.6}, "time_s", "torque_Nm", PENDULUM),
     "load-friction-angle": (
         {"coulomb_Nm": 0.6, "share": 0.8}, "load_angle_rad", "torque_Nm", PENDULUM,

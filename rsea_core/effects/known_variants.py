@@ -6,6 +6,7 @@ from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.formula_torque import formulas_to_read
 from rsea_core.effects.load_disturbance import LoadDisturbance, disturbance
 from rsea_core.effects.load_flexibility import LoadFlexibility
+from rsea_core.effects.load_inertia_variation import LoadInertiaVariation
 from rsea_core.effects.motor_cogging import CYCLES_TRIED, MotorCogging, cogging
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.residual_table import laws_to_read
@@ -26,6 +27,7 @@ def laws_by_key() -> dict[str, Law]:
     laws += [
         DriveOffset.nuisance(1.0, 1.0),
         DriveNonlinearGain.unnamed(1.0),
+        LoadInertiaVariation.unnamed(1),
         *laws_to_read(FITTED),
         *formulas_to_read(),
         disturbance("", 0, (0.0, 1.0, 1.0), 1.0, 1.0),

@@ -112,6 +112,11 @@ from rsea_core.effects.load_friction import (  # noqa: F401
     WEIGHT,
     load_coulomb,
 )
+from rsea_core.effects.load_inertia_variation import (  # noqa: F401
+    INERTIA_COSINE,
+    INERTIA_SINE,
+    inertia_factor,
+)
 from rsea_core.effects.load_position_torque import (  # noqa: F401
     N_POSITIONS,
     POSITION_FIRST,

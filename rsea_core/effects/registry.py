@@ -37,6 +37,7 @@ from rsea_core.effects.load_friction_angle import LoadFrictionAngle as LoadFrict
 from rsea_core.effects.load_drag import LoadDrag
 from rsea_core.effects.load_drag import PowerDrag as PowerDrag
 from rsea_core.effects.load_flexibility import LoadFlexibility
+from rsea_core.effects.load_inertia_variation import LoadInertiaVariation as LoadInertiaVariation
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.load_position_torque import LoadPositionTorque
 from rsea_core.effects.contact_nonlinear import ContactNonlinear

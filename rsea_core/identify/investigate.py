@@ -50,6 +50,7 @@ from rsea_core.identify.whole_runs.complete import (
 )
 from rsea_core.identify.whole_runs.parameters_alone import found_sound
 from rsea_core.identify.whole_runs.sensor_noise import (
+    converged,
     in_noise_left_by,
     in_sensor_noise,
     misfit,
@@ -79,7 +80,10 @@ def investigate(
         found, shared = _searched(case, recorded, shared, say, quick=quick)
     found.shared = shared
     if not quick:
-        found.continue_from(found.estimator, refitted_from_rig(found.estimator, found.best))
+        own, best = found.estimator, found.best
+        end = converged(own, best.hypothesis, best.x)
+        best = end if end.cost < best.cost else best
+        found.continue_from(own, refitted_from_rig(own, best))
     best = found.best
     _, x = with_pause_shown(found, (best.hypothesis, best.x), found.horizon)
     found.best, found.pause_shown = replace(best, x=x), x is not best.x

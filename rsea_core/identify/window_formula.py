@@ -13,6 +13,7 @@ from rsea_core.effects.drive_dead_zone import DriveDeadZone
 from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.formula_torque import FORMULAS, FormulaTorque, formula_law
+from rsea_core.effects.load_inertia_variation import LoadInertiaVariation
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.formula.sparse_regression import STATES, Selection, select
 from rsea_core.identify.formula.varying_inertia import VaryingInertia, varying_inertia
@@ -28,11 +29,18 @@ from rsea_core.identify.multistep.criteria import (
     INERTIA_RATIO,
     KEPT_RATIO,
     LEAST_GAIN,
+    MUCH_LEFT,
     PER_VALUE,
     SHAPE_GAIN,
     SHAPE_RATIO,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
+from rsea_core.identify.whole_runs.sensor_noise import (
+    converged,
+    in_sensor_noise,
+    misfit,
+    refitted_from_rig,
+)
 from rsea_core.identify.window_fit import fit_of, spread_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 
@@ -190,7 +198,43 @@ def inertia_of(
     say(f"  {best.sentence()}: held-out gain {best.held_out:.1f} +- {best.deviation:.1f}")
     least = max(INERTIA_GAIN, INERTIA_RATIO * best.deviation, shape.held_out if shape else 0.0)
     seen = best.held_out > least and INERTIA_LEAST < best.share < 1.0
-    return best if seen else None
+    return _fitted_inertia(found, best, say) if seen else None
+
+
+def _fitted_inertia(found: Found, wave: VaryingInertia, say) -> VaryingInertia:
+    """The wave with its fit; as the regression has it where it is no wave of the load's inertia."""
+    own, base, case = found.base_estimator, found.base, found.problem.case
+    inertia = own.tracks[0].plant.load_inertia
+    if wave.side != "load" or not 0.0 < wave.amplitude_kgm2 < inertia or not case.rig.has("load"):
+        return wave
+    law = LoadInertiaVariation.unnamed(wave.cycles)
+    parts = np.array([wave.cosine_kgm2, wave.sine_kgm2]) / (inertia * law.unknowns[0].scale)
+    h = Hypothesis(laws=(*base.hypothesis.laws, law))
+    own, fit = settled(own, own.fit(h, np.concatenate([base.x, parts]), iterations=8))
+    gain = gain_of(own, base, fit)
+    say(f"  fitted: gain {gain:.1f}")
+    if gain < INERTIA_GAIN or at_bound(own.problem, fit, law):
+        return wave
+    own, fit = _in_whole_recordings(found, (own, fit))
+    nominal, laws = own.problem.values(h, fit.x)
+    inertia = nominal.get("load_inertia_kgm2", case.rig.load_inertia_kgm2)
+    cosine, sine = (inertia * laws[-1][f"{part}_share"] for part in ("cosine", "sine"))
+    share = wave.share * float(np.hypot(cosine, sine)) / wave.amplitude_kgm2
+    return replace(wave, cosine_kgm2=cosine, sine_kgm2=sine, share=share, estimator=own, fit=fit)
+
+
+def _in_whole_recordings(
+    found: Found, windows: tuple[Estimator, Estimate]
+) -> tuple[Estimator, Estimate]:
+    """A law's fit to whole recordings; the one given where parameters alone leave little more.
+
+    In the noise of the readings no unknown torque explains what the law's values should.
+    """
+    h, x = windows[1].hypothesis, windows[1].x
+    own = in_sensor_noise(found.base_estimator, found.base)
+    fit = refitted_from_rig(own, converged(own, h, x))
+    before = misfit(own, found.base.hypothesis, found.base.x)
+    return (own, fit) if misfit(own, h, fit.x) < MUCH_LEFT * before else windows
 
 
 def _beyond_spring(found: Found, shape: Shape | None) -> bool:

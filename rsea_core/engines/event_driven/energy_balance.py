@@ -10,6 +10,7 @@ import rsea_core.engines.event_driven.internal_states as m
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.effects.gear_transmission_error import angle_error, array_angle_error
+from rsea_core.effects.load_inertia_variation import array_inertia_factor
 from rsea_core.effects.registry import DriveThermal, Term
 from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
 from rsea_core.machine.spring_table import SpringTable, spring_energy_J
@@ -100,7 +101,9 @@ def energy_ledger(
         link_loss_J=integral(k.LINK_LOSS),
         impact_loss_J=read_only(np.array(impact)),
         magnetic_J=read_only(0.5 * winding * current**2),
-        kinetic_J=read_only(kinetic + 0.5 * plant.load_inertia * load_speed**2),
+        kinetic_J=read_only(
+            kinetic + 0.5 * plant.load_inertia * array_inertia_factor(fx, load) * load_speed**2
+        ),
         elastic_J=read_only(spring_energy_J(spring, deflection)),
         gravity_J=read_only(plant.gravity * one_less_cosine(load + plant.gravity_offset)),
         contact_elastic_J=read_only(contact_stored_J(fx, plant.contact_stiffness, beyond)),

@@ -178,6 +178,8 @@ def torques(plant, spring, fx, mode, drive_torque, y):
     wheel += e.wheel_torque(fx, y[k.TW], y[k.WW]) - e.gear_smooth_friction(fx, y[k.WW])
     added, drag = e.load_torque(fx, y[k.TL], y[k.WL], pulse_share(fx, mode, y))
     load += added
+    _, slope = e.inertia_factor(fx, y[k.TL])
+    load -= 0.5 * plant.load_inertia * slope * y[k.WL] * y[k.WL]
     deflection, rate, lever = deflection_and_rate(plant, fx, y)
     if elastic_joint:
         output = table_torque(spring, deflection)
@@ -325,6 +327,7 @@ def _accelerate(plant, fx, mode, y, moving, held, derivatives, row):
     Returns tau_s: of a rigid body the torque in the joint.
     """
     wheel, load, output, lever, wheel_dry, load_dry = moving
+    inertia = plant.load_inertia * e.inertia_factor(fx, y[k.TL])[0]
     wheel_stuck = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
     load_stuck = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
     if fx[e.BACKLASH] > 0.0 and abs(y[k.FLANK]) == flanks.TOUCHING:
@@ -335,7 +338,7 @@ def _accelerate(plant, fx, mode, y, moving, held, derivatives, row):
         flanks.wheel_rates(
             plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, derivatives, row
         )
-        derivatives[row, k.WL] = (load + output - load_dry) / plant.load_inertia
+        derivatives[row, k.WL] = (load + output - load_dry) / inertia
     elif plant.structure == ELASTIC_HELD:
         flanks.wheel_rates(
             plant, fx, y, wheel - wheel_dry, lever * output, wheel_stuck, derivatives, row
@@ -349,13 +352,13 @@ def _accelerate(plant, fx, mode, y, moving, held, derivatives, row):
             share = e.rigid_share(fx, mode.wheel, mode.torque_sign)
         elif b.carry_the_load(fx):
             share = 1.0 + b.thread_loss(fx, y, mode.torque_sign)
-        whole = plant.inertia + share * plant.load_inertia
+        whole = plant.inertia + share * inertia
         derivatives[row, k.WW] = (wheel - wheel_dry + share * (load - load_dry)) / whole
         if wheel_stuck or load_stuck:
             derivatives[row, k.WW] = 0.0
         derivatives[row, k.WL] = derivatives[row, k.WW]
         # of a stuck body the joint carries what the side without dry friction needs
-        output = plant.load_inertia * derivatives[row, k.WW] - load + load_dry
+        output = inertia * derivatives[row, k.WW] - load + load_dry
         if load_stuck:
             output = wheel
         derivatives[row, k.POWER + k.GEAR_FRICTION] += (share - 1.0) * output * y[k.WW]

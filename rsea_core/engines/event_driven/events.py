@@ -173,7 +173,8 @@ def _term_switch(plant, spring, fx, mode, command, time, y, switch):
         if plant.structure == mp.RIGID_FREE and (mode.wheel != 0 or b.carry_the_load(fx)):
             # of what it transmits while it moves, whose sign no friction changes
             wheel += output - mode.wheel * e.gear_friction(fx, mode.wheel, y[k.WW], 0.0, 1)
-            output = plant.load_inertia * wheel + plant.inertia * output
+            inertia = plant.load_inertia * e.inertia_factor(fx, y[k.TL])[0]
+            output = inertia * wheel + plant.inertia * output
         return -mode.torque_sign * output
     dry, direction, speed = fx[e.WHEEL_DRY], mode.wheel, y[k.WW]
     if switch == k.LOAD_SWITCH:

@@ -220,6 +220,7 @@ def find_features(plant, spring, fx, on):
     speed = fx[e.GEAR_RISE] != 0.0 or fx[e.LOAD_RISE] != 0.0 or fx[e.DRAG] != 0.0
     speed = speed or fx[e.ATAN_LEVEL] != 0.0 or fx[e.SPRING_DAMPING] != 0.0
     speed = speed or fx[e.NORMAL_FRICTION] != 0.0 or fx[e.DEAD_TIME] != 0.0
+    speed = speed or fx[e.INERTIA_COSINE] != 0.0 or fx[e.INERTIA_SINE] != 0.0
     speed = speed or fx[e.OUTSIDE] != 0.0  # laws of users may be of any speed
     speed = speed or (link and fx[e.LINK_DAMPING] != 0.0)
     speed = speed or fx[e.GEAR_BRISTLE_DAMPING] != 0.0 or fx[e.LOAD_BRISTLE_DAMPING] != 0.0

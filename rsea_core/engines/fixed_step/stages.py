@@ -90,6 +90,7 @@ class Torques(NamedTuple):
     load: float
     load_damping: float
     link: float
+    load_inertia: float
 
 
 class Dry(NamedTuple):
@@ -211,7 +212,10 @@ def _torques(machine, fx, drive, spring, applied, bodies, means):
             load_damping += e.drag_damping(fx, means.load)
         if machine.link:
             load -= link
-    return Torques(gear, damping, joined, -spring.lever * joined, load, load_damping, link)
+    return Torques(
+        gear, damping, joined, -spring.lever * joined, load, load_damping, link,
+        applied.load_inertia,
+    )  # fmt: skip
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -270,7 +274,7 @@ def _all_bodies(machine, fx, torques, dry, middle, bodies, h):
     load_deflection, tip_speed, joint = bodies.load_deflection, bodies.tip_speed, 0.0
     output_speed, output_moved = bodies.output_speed, 0.0
     gear = b.Body(machine.gear_inertia, dry.gear_damping, torques.gear)
-    load = b.Body(machine.plant.load_inertia, dry.load_damping, torques.load)
+    load = b.Body(torques.load_inertia, dry.load_damping, torques.load)
     per_h = 1.0 / h
     if machine.load_losses:
         losses = fx[e.GEAR_DRIVE_LOSS], fx[e.GEAR_BACKDRIVE_LOSS]

@@ -55,6 +55,7 @@ class Applied(NamedTuple):
     sliding: float  # level that hooks add to the dry friction of the load's joint, sliding
     holding: float  # and at rest
     link: float  # elastic torque of the flexible link
+    load_inertia: float
 
 
 @njit(error_model="numpy")
@@ -305,6 +306,7 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
     """Torques that depend on positions and on the time."""
     plant = machine.plant
     gear, load, factor = 0.0, plant.load_torque, 1.0
+    inertia = plant.load_inertia
     if machine.terms:
         gear = gear_torque(fx, middle.gear, middle.gear_mean)
         if fx[e.RIPPLE] != 0.0:
@@ -312,6 +314,9 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
             factor += fx[e.RIPPLE] * np.sin(angle)
         load = e.load_torque_by_angle(fx, middle.load, middle.load_mean, load)
         load += fx[e.PULSE] * pulse_share(fx, piece.begin + start, piece.h)
+        share, slope = e.inertia_factor(fx, middle.load)
+        load -= 0.5 * inertia * slope * middle.load_mean * middle.load_mean
+        inertia *= share
     hanging = middle.load + plant.gravity_offset
     if plant.gravity != 0.0:
         load -= plant.gravity * np.sin(hanging)
@@ -328,4 +333,4 @@ def applied_in_middle(machine, fx, piece, middle, bodies, start):
     if machine.link:
         deflected = middle.load - bodies.tip - piece.half * bodies.tip_speed
         link = fx[e.LINK_STIFFNESS] * deflected
-    return Applied(gear, load, damping, factor, sliding, holding, link)
+    return Applied(gear, load, damping, factor, sliding, holding, link, inertia)

@@ -3,7 +3,7 @@
 A body of inertia J(theta) needs the torque J alpha + J' omega^2 / 2 (Lagrange's equation of a
 kinetic energy J omega^2 / 2; Norton, Design of Machinery (2012), section 11.4). Waves of the angle
 times alpha and omega^2 in that proportion are regressed on innovations as the terms of a formula
-(`sparse_regression`). No engine simulates it: it is reported, not fitted.
+(`sparse_regression`). That of the load is then fitted (`LoadInertiaVariation`).
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class VaryingInertia:
     side : str
         Part of the machine.
     estimator, fit
-        Parameters alone.
+        With the law of the load's inertia; parameters alone where it is another body's.
     """
 
     cycles: int
@@ -49,6 +49,11 @@ class VaryingInertia:
     side: str
     estimator: Estimator
     fit: Estimate
+
+    @property
+    def amplitude_kgm2(self) -> float:
+        """Of the wave."""
+        return float(np.hypot(self.cosine_kgm2, self.sine_kgm2))
 
     def sentence(self) -> str:
         """What it is, with its size."""
