@@ -61,8 +61,8 @@ class Shape:
 
     @property
     def subsystem(self) -> str:
-        """Part of the machine: what follows the command is the drive's."""
-        return "drive" if self.signal == "command" else PORTS[self.port]
+        """Part of the machine: what follows command or current is the drive's."""
+        return "drive" if self.signal in ("command", "current") else PORTS[self.port]
 
 
 def shapes(projection: Projection) -> list[Shape]:

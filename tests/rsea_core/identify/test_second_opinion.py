@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose
+from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import CURTAILED
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
@@ -20,7 +21,8 @@ def opinion(error: float, alone: float):
         {"role": role, "nrmse_after": error, "nrmse_parameters_only": alone}
         for role in ("identification", "validation")
     ]
-    found = SimpleNamespace(complete=False, explained=0.0)
+    fit = SimpleNamespace(hypothesis=SimpleNamespace(laws=()))
+    found = SimpleNamespace(complete=False, explained=0.0, best=fit)
     doubtful = SimpleNamespace(found=found, estimator=SimpleNamespace(tempering=0.1))
     document = {"verdict": "missing-physics", "fit": {"recordings": rows}, "effects": []}
     return SimpleNamespace(document=document, conclusion=doubtful, findings=())
@@ -54,6 +56,17 @@ def test_no_second_opinion_is_asked_where_the_work_was_limited(tmp_path, monkeyp
     case = replace(case, recordings=(*case.recordings, held_out))
     first = opinion(0.3, 3.0)
     first.findings = (CURTAILED,)
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: first)
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinion(0.1, 3.0))
+    assert diagnose(case) is first
+
+
+def test_free_runs_have_no_opinion_on_laws_found_with_a_gear_mesh(tmp_path, monkeypatch):
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    held_out = replace(case.recordings[0], role="validation")
+    case = replace(case, recordings=(*case.recordings, held_out))
+    first = opinion(0.3, 3.0)
+    first.conclusion.found.best.hypothesis.laws = (SimpleNamespace(effect=MESH_DAMPER),)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: first)
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinion(0.1, 3.0))
     assert diagnose(case) is first
