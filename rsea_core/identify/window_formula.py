@@ -208,7 +208,8 @@ def _fitted_inertia(found: Found, wave: VaryingInertia, say) -> VaryingInertia:
     if wave.side != "load" or not 0.0 < wave.amplitude_kgm2 < inertia or not case.rig.has("load"):
         return wave
     law = LoadInertiaVariation.unnamed(wave.cycles)
-    parts = np.array([wave.cosine_kgm2, wave.sine_kgm2]) / (inertia * law.unknowns[0].scale)
+    part, shares = law.unknowns[0], np.array([wave.cosine_kgm2, wave.sine_kgm2]) / inertia
+    parts = np.clip(shares, part.low, part.high) / part.scale
     h = Hypothesis(laws=(*base.hypothesis.laws, law))
     own, fit = settled(own, own.fit(h, np.concatenate([base.x, parts]), iterations=8))
     gain = gain_of(own, base, fit)
