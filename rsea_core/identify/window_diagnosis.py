@@ -10,7 +10,9 @@ from rsea_core.files.csv_columns import unit_of
 from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.fitting.truncation import truncate
 from rsea_core.identify.investigate import investigate
+from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import as_effect
+from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.command_timing import CommandTiming, RowTimes
 from rsea_core.identify.multistep.criteria import SURE
 from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, MESH_DAMPER, RATIO
@@ -128,9 +130,7 @@ def location_of(conclusion: WindowVerdict) -> dict | None:
         return None
     share = conclusion.explained_excess()
     if conclusion.unknown is not None:
-        place = conclusion.unknown.subsystem
-        if conclusion.found.steps and any(s is conclusion.unknown for s in conclusion.found.shapes):
-            place = conclusion.found.steps[0].law.subsystem
+        place = place_of_unknown(conclusion.found, conclusion.unknown)
     elif conclusion.found.steps or conclusion.verdict == "unexplained":
         place = unexplained_place(conclusion)
     else:
@@ -141,6 +141,13 @@ def location_of(conclusion: WindowVerdict) -> dict | None:
         "where": conclusion.mismatched_recordings(),
         "share_of_mismatch": round(share, 3),
     }
+
+
+def place_of_unknown(found: Found, unknown: Shape) -> str:
+    """The place of an unknown torque; of the first law, where that gains more beside it."""
+    beside = found.steps and any(s is unknown for s in found.shapes)
+    first = found.steps[0] if beside else None
+    return first.law.subsystem if first and first.gain > unknown.held_out else unknown.subsystem
 
 
 def largest_channel(conclusion: WindowVerdict) -> str:

@@ -15,7 +15,7 @@ from rsea_core.identify.judgement.covariance import (
     jackknife_of_identifiable,
     no_wider,
 )
-from rsea_core.identify.law_search.found import Step
+from rsea_core.identify.law_search.found import Found, Step
 from rsea_core.identify.multistep.criteria import (
     DELAY_ROWS,
     DOUBTED_ERROR,
@@ -194,6 +194,15 @@ def leaves_some_torque(estimator: Estimator) -> bool:
     is no physics of the machine.
     """
     return _largest_unknown_torque(estimator, slow=True)[0] > UNKNOWN_SHARE
+
+
+def explain_negligible_torque(found: Found) -> bool:
+    """Whether laws of windows explain less torque than an amplifier's drifting offset makes.
+
+    Laws that are complete over whole recordings may be that small.
+    """
+    acting = found.steps and all(step.law.sensor is None for step in found.steps)
+    return bool(acting) and not (found.complete or leaves_some_torque(found.base_estimator))
 
 
 def _largest_unknown_torque(

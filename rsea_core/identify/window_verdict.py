@@ -43,6 +43,7 @@ from rsea_core.identify.window_findings import stands
 from rsea_core.identify.window_fit import (
     FoundFit,
     FoundSearch,
+    explain_negligible_torque,
     fit_of,
     late_command,
     leaves_much_torque,
@@ -318,13 +319,13 @@ def with_evidence(
 ) -> tuple[Found, HeldOut | None, CommandFormula | None]:
     """The laws that there is evidence of, their gain held out, and a formula instead of a law.
 
-    Where commands are smoothed, laws that fail in longer windows are dropped: they may describe
-    commands that the log lacks.
+    Dropped are laws that explain a negligible torque, and laws that fail in longer windows where
+    commands are smoothed: they may describe commands that the log lacks.
     """
     found, unseen = beyond_chance(found)
     instead = None if found.complete else gain_over_named(found, say)
-    smooth = found.problem.timing.smooth
-    if instead is not None or (smooth and fails_in_longer_windows(found, unseen)):
+    fails = found.problem.timing.smooth and fails_in_longer_windows(found, unseen)
+    if instead is not None or fails or explain_negligible_torque(found):
         found, unseen = found.parameters_alone(), None
     return found, unseen, instead
 

@@ -1,10 +1,15 @@
 """Values that leave much of the torque unknown explain nothing, whatever they are."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from rsea_core.engines.fixed_step.replay import Replay
-from rsea_core.identify.window_diagnosis import diagnose_windows
+from rsea_core.identify.multistep.criteria import UNKNOWN_SHARE
+from rsea_core.identify.multistep.noise_estimate import SLOW_INPUT
+from rsea_core.identify.window_diagnosis import diagnose_windows, place_of_unknown
+from rsea_core.identify.window_fit import explain_negligible_torque
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.recording import Recording
@@ -36,3 +41,38 @@ def test_values_of_the_rig_do_not_explain_large_random_torques(tmp_path, share, 
     if verdict == "unexplained":
         assert "leave an unknown torque" in found["remainder"]["words"]
         assert "of the usual torque" in found["remainder"]["words"]
+
+
+@pytest.mark.parametrize(
+    ("share", "complete", "sensor", "negligible"),
+    [
+        (0.5, False, None, True),
+        (2.0, False, None, False),
+        (0.5, True, None, False),  # whole recordings show it
+        (0.5, False, "load_angle_rad", False),  # no torque
+    ],
+)
+def test_laws_of_windows_explain_nothing_where_hardly_a_torque_is_unknown(
+    share, complete, sensor, negligible
+):
+    """Cogging of 0.2 % of the torque was claimed for an offset that drifts (31001, u01)."""
+    usual, torque = 3.0, share * UNKNOWN_SHARE * 3.0
+    inputs = np.zeros(SLOW_INPUT + 1)
+    inputs[SLOW_INPUT] = torque
+    track = SimpleNamespace(
+        noise=SimpleNamespace(inputs=inputs), scale=SimpleNamespace(torque_Nm=(usual,), time_s=1.0)
+    )
+    step = SimpleNamespace(law=SimpleNamespace(sensor=sensor))
+    found = SimpleNamespace(
+        complete=complete, steps=[step], base_estimator=SimpleNamespace(tracks=[track])
+    )
+    assert explain_negligible_torque(found) == negligible
+
+
+@pytest.mark.parametrize(("gain", "place"), [(20.0, "drive"), (60.0, "sensor:current_A")])
+def test_what_gains_most_of_a_law_and_a_torque_beside_it_is_the_place(gain, place):
+    """A gain that differs with the command's sign was placed in a sensor that drifts (u03)."""
+    shape = SimpleNamespace(subsystem="drive", held_out=40.0)
+    step = SimpleNamespace(gain=gain, law=SimpleNamespace(subsystem="sensor:current_A"))
+    found = SimpleNamespace(steps=[step], shapes=[shape])
+    assert place_of_unknown(found, shape) == place
