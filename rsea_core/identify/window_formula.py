@@ -184,8 +184,8 @@ def inertia_of(
 ) -> VaryingInertia | None:
     """An inertia that varies with the angle; None where a shape gains as much, or none is seen.
 
-    It gains where the motion is fast: the gain is less even than that of a torque. A linear axis
-    has no turn.
+    It gains where the motion is fast: the gain is less even than that of a torque. A small gain
+    counts where its fit is confirmed. A linear axis has no turn.
     """
     if found.problem.case.rig.axis == "linear":
         return None
@@ -196,32 +196,42 @@ def inertia_of(
     if best is None:
         return None
     say(f"  {best.sentence()}: held-out gain {best.held_out:.1f} +- {best.deviation:.1f}")
-    least = max(INERTIA_GAIN, INERTIA_RATIO * best.deviation, shape.held_out if shape else 0.0)
-    seen = best.held_out > least and INERTIA_LEAST < best.share < 1.0
-    return _fitted_inertia(found, best, say) if seen else None
+    least = max(SHAPE_GAIN, INERTIA_RATIO * best.deviation, shape.held_out if shape else 0.0)
+    if best.held_out < least or not INERTIA_LEAST < best.share < 1.0:
+        return None
+    wave, stands = _fitted_inertia(found, best, say)
+    return wave if stands or best.held_out > INERTIA_GAIN else None
 
 
-def _fitted_inertia(found: Found, wave: VaryingInertia, say) -> VaryingInertia:
-    """The wave with its fit; as the regression has it where it is no wave of the load's inertia."""
+def _fitted_inertia(found: Found, wave: VaryingInertia, say) -> tuple[VaryingInertia, bool]:
+    """The wave with its fit, and whether that is confirmed as a formula of a torque is.
+
+    As the regression has it where it is no wave of the load's inertia.
+    """
     own, base, case = found.base_estimator, found.base, found.problem.case
     inertia = own.tracks[0].plant.load_inertia
     if wave.side != "load" or not 0.0 < wave.amplitude_kgm2 < inertia or not case.rig.has("load"):
-        return wave
+        return wave, False
     law = LoadInertiaVariation.unnamed(wave.cycles)
     part, shares = law.unknowns[0], np.array([wave.cosine_kgm2, wave.sine_kgm2]) / inertia
     parts = np.clip(shares, part.low, part.high) / part.scale
     h = Hypothesis(laws=(*base.hypothesis.laws, law))
     own, fit = settled(own, own.fit(h, np.concatenate([base.x, parts]), iterations=8))
-    gain = gain_of(own, base, fit)
-    say(f"  fitted: gain {gain:.1f}")
-    if gain < INERTIA_GAIN or at_bound(own.problem, fit, law):
-        return wave
+    gain, ratio = gain_of(own, base, fit), confirmed(own, base, fit)
+    say(f"  fitted: gain {gain:.1f}, ratio {ratio:.1f}")
+    if gain < LEAST_GAIN or at_bound(own.problem, fit, law):
+        return wave, False
+    stands = gain > SHAPE_GAIN and ratio > KEPT_RATIO
+    stands = stands and not _loses_held_out(found, own, fit, law, gain, ratio)
     own, fit = _in_whole_recordings(found, (own, fit))
     nominal, laws = own.problem.values(h, fit.x)
     inertia = nominal.get("load_inertia_kgm2", case.rig.load_inertia_kgm2)
     cosine, sine = (inertia * laws[-1][f"{part}_share"] for part in ("cosine", "sine"))
     share = wave.share * float(np.hypot(cosine, sine)) / wave.amplitude_kgm2
-    return replace(wave, cosine_kgm2=cosine, sine_kgm2=sine, share=share, estimator=own, fit=fit)
+    return (
+        replace(wave, cosine_kgm2=cosine, sine_kgm2=sine, share=share, estimator=own, fit=fit),
+        stands,
+    )
 
 
 def _in_whole_recordings(
