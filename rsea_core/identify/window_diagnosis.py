@@ -145,8 +145,8 @@ def location_of(conclusion: WindowVerdict) -> dict | None:
 
 def place_of_unknown(found: Found, unknown: Shape) -> str:
     """The place of an unknown torque; of the first law, where that gains more beside it."""
-    beside = found.steps and any(s is unknown for s in found.shapes)
-    first = found.steps[0] if beside else None
+    more = any(s is unknown for s in found.shapes)  # than the laws found explain
+    first = found.steps[0] if found.steps and more else None
     return first.law.subsystem if first and first.gain > unknown.held_out else unknown.subsystem
 
 

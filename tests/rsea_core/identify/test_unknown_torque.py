@@ -70,7 +70,7 @@ def test_laws_of_windows_explain_nothing_where_hardly_a_torque_is_unknown(
 
 
 @pytest.mark.parametrize(("gain", "place"), [(20.0, "drive"), (60.0, "sensor:current_A")])
-def test_what_gains_most_of_a_law_and_a_torque_beside_it_is_the_place(gain, place):
+def test_the_place_is_that_of_a_law_or_of_the_unknown_torque_whichever_gains_more(gain, place):
     """A gain that differs with the command's sign was placed in a sensor that drifts (u03)."""
     shape = SimpleNamespace(subsystem="drive", held_out=40.0)
     step = SimpleNamespace(gain=gain, law=SimpleNamespace(subsystem="sensor:current_A"))

@@ -11,6 +11,7 @@ import pytest
 
 from rsea_core.effects.drive_nonlinear_gain import DriveNonlinearGain
 from rsea_core.effects.registry import GearFriction, LoadFriction, LoadUnbalance
+from rsea_core.identify import window_verdict
 from rsea_core.identify.diagnose import diagnose, is_bench
 from rsea_core.identify.experiment.experiment_file import decisive_experiment
 from rsea_core.identify.window_diagnosis import diagnose_windows
@@ -85,7 +86,8 @@ def test_a_torque_constant_that_falls_with_the_current_is_a_formula_and_no_curre
     assert [t["function"] for t in found.document["remainder"]["formula"]["terms"]][-1] == "u^3"
 
 
-def test_what_the_data_cannot_decide_gets_an_experiment_that_would(tmp_path):
+def test_what_the_data_cannot_decide_gets_an_experiment_that_would(tmp_path, monkeypatch):
+    monkeypatch.setattr(window_verdict, "explain_negligible_torque", lambda found: False)
     found = diagnose_windows(axis(tmp_path, GearFriction(coulomb_Nm=5e-5)), quick=True).conclusion
     found.verdict = "insufficient-data"  # at this size it is, or nearly so
     wanted = decisive_experiment(found)
