@@ -114,8 +114,10 @@ from rsea_core.effects.load_friction import (  # noqa: F401
 )
 from rsea_core.effects.load_inertia_variation import (  # noqa: F401
     INERTIA_COSINE,
+    INERTIA_CYCLES,
     INERTIA_SINE,
     inertia_factor,
+    least_inertia_factor,
 )
 from rsea_core.effects.load_position_torque import (  # noqa: F401
     N_POSITIONS,

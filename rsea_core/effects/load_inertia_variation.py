@@ -1,4 +1,4 @@
-"""An inertia of the load that varies with its angle, as of a crank, a cam or a linkage."""
+"""An inertia of the load that varies with its angle, such as that of a crank or a linkage."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,11 +13,12 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
-from rsea_core.effects.variant import Law, TrialMachine, Unknown, Values, writes_numbers
+from rsea_core.effects.variant import Law, Unknown, writes_numbers
 
 INERTIA_COSINE, INERTIA_SINE, INERTIA_CYCLES = slots(
     "inertia_cosine", "inertia_sine", "inertia_cycles"
 )
+LARGEST_PART = 0.67  # of the mean inertia: both parts together leave 5 % of it
 PART_SCALE = 0.01  # step of a fit, of the mean inertia
 
 
@@ -33,21 +34,24 @@ def inertia_factor(fx, angle):
     return factor, slope
 
 
+@njit(error_model="numpy", inline="always")
+def least_inertia_factor(fx):
+    """The smallest inertia over its mean."""
+    return 1.0 - np.hypot(fx[INERTIA_COSINE], fx[INERTIA_SINE])
+
+
 def array_inertia_factor(fx: NDArray, angle: NDArray) -> NDArray:
     """Inertia over its mean for an array of load angles [rad]."""
     return inertia_factor.py_func(fx, angle)[0] + np.zeros_like(angle)
 
 
-def _factor_of(d: TrialMachine, v: Values, x: NDArray) -> NDArray:
-    return array_inertia_factor(d.fx, x)
-
-
 @dataclass(frozen=True, kw_only=True)
 class LoadInertiaVariation(Term):
-    """An inertia J (1 + a cos(n theta) + b sin(n theta)) of the load; no effect of the contract.
+    """An inertia J (1 + a cos(n theta) + b sin(n theta)) of the load.
 
-    It takes the torque J(theta) alpha + J'(theta) omega^2 / 2 (Lagrange's equation of the kinetic
-    energy J(theta) omega^2 / 2). A diagnosis that finds it says `unexplained` with this formula.
+    The motion takes the torque J(theta) alpha + J'(theta) omega^2 / 2 (Lagrange's equation of the
+    kinetic energy J(theta) omega^2 / 2). It is not an effect of the contract: a diagnosis that
+    finds it reports `unexplained` with this formula.
 
     Source
     ------
@@ -61,15 +65,16 @@ class LoadInertiaVariation(Term):
     figure_units: ClassVar[Mapping[str, str]] = {"cosine_share": "-", "sine_share": "-"}
     curve: ClassVar = EffectCurve(
         title="Inertia of the load over its mean", x_label="load angle (rad)",
-        y_label="inertia over its mean", over="load_angle", evaluate=_factor_of,
+        y_label="inertia over its mean", over="load_angle",
+        evaluate=lambda d, v, x: array_inertia_factor(d.fx, x),
     )  # fmt: skip
 
     cosine_share: float = parameter(
-        0.0, unit="-", bounds=(-0.67, 0.67), source="a fit",
+        0.0, unit="-", bounds=(-LARGEST_PART, LARGEST_PART), source="a fit",
         meaning="Amplitude of the cosine of the angle, over the mean inertia.",
     )  # fmt: skip
     sine_share: float = parameter(
-        0.0, unit="-", bounds=(-0.67, 0.67), source="a fit",
+        0.0, unit="-", bounds=(-LARGEST_PART, LARGEST_PART), source="a fit",
         meaning="Amplitude of the sine of the angle, over the mean inertia.",
     )  # fmt: skip
     cycles_per_rev: float = parameter(
@@ -78,7 +83,7 @@ class LoadInertiaVariation(Term):
     )  # fmt: skip
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
-        """Both parts of the wave."""
+        """Both parts and the number of periods."""
         return {"inertia_cosine": self.cosine_share, "inertia_sine": self.sine_share,
                 "inertia_cycles": self.cycles_per_rev}  # fmt: skip
 
@@ -94,9 +99,15 @@ class LoadInertiaVariation(Term):
 
     @classmethod
     def unnamed(cls, cycles: int) -> Law:
-        """The wave's parts as free values, with so many periods in a turn."""
+        """Both parts as free values, with a given number of periods in a turn of the load."""
         parts = tuple(
-            Unknown(name=f"{part}_share", unit="-", low=-0.67, high=0.67, scale=PART_SCALE)
+            Unknown(
+                name=f"{part}_share",
+                unit="-",
+                low=-LARGEST_PART,
+                high=LARGEST_PART,
+                scale=PART_SCALE,
+            )
             for part in ("cosine", "sine")
         )
         fixed = Unknown(name="cycles_per_rev", unit="-", low=cycles, high=cycles, scale=0.0)

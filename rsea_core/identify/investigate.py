@@ -158,14 +158,14 @@ def _whole_recordings(case: Case, say) -> tuple[Found, Found | None]:
 
 
 def _with_lost_motion(case: Case, say) -> Found | None:
-    """The search with the gear's mesh as a spring, where the encoders alone show lost motion.
+    """The search with the gear's mesh as a spring, if the encoders alone show lost motion.
 
-    None where they do not, or where windows show no backlash.
+    None if they do not, or if no backlash is found.
     """
     elastic = with_gear_mesh(case) if shows_lost_motion(case) else None
     if elastic is None:
         return None
-    say("the encoders show lost motion in a train without a spring: with an elastic gear mesh")
+    say("the encoders of a rigid train show lost motion: searched with an elastic gear mesh")
     found = searched(elastic[0], None, say, mesh=elastic[1])
     if not any(step.law.effect == GearBacklash.effect for step in found.steps):
         return None

@@ -144,10 +144,11 @@ def location_of(conclusion: WindowVerdict) -> dict | None:
 
 
 def place_of_unknown(found: Found, unknown: Shape) -> str:
-    """The place of an unknown torque; of the first law, where that gains more beside it."""
-    more = any(s is unknown for s in found.shapes)  # than the laws found explain
-    first = found.steps[0] if found.steps and more else None
-    return first.law.subsystem if first and first.gain > unknown.held_out else unknown.subsystem
+    """The place of an unknown torque; that of the first law, if the law gains more."""
+    remains = any(s is unknown for s in found.shapes)  # with the laws that were found
+    if found.steps and remains and found.steps[0].gain > unknown.held_out:
+        return found.steps[0].law.subsystem
+    return unknown.subsystem
 
 
 def largest_channel(conclusion: WindowVerdict) -> str:

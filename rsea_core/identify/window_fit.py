@@ -196,8 +196,8 @@ def leaves_some_torque(estimator: Estimator) -> bool:
     return _largest_unknown_torque(estimator, slow=True)[0] > UNKNOWN_SHARE
 
 
-def explain_negligible_torque(found: Found) -> bool:
-    """Whether laws of windows explain less torque than an amplifier's drifting offset makes.
+def explains_only_negligible_torque(found: Found) -> bool:
+    """Whether laws found in windows explain no more torque than a drifting amplifier offset.
 
     Laws that are complete over whole recordings may be that small.
     """

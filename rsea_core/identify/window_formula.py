@@ -204,9 +204,9 @@ def inertia_of(
 
 
 def _fitted_inertia(found: Found, wave: VaryingInertia, say) -> tuple[VaryingInertia, bool]:
-    """The wave with its fit, and whether that is confirmed as a formula of a torque is.
+    """The inertia fitted, and whether the fit is confirmed by the criteria of a torque's formula.
 
-    As the regression has it where it is no wave of the load's inertia.
+    The inertia as regressed, if it is not that of the load.
     """
     own, base, case = found.base_estimator, found.base, found.problem.case
     inertia = own.tracks[0].plant.load_inertia
@@ -237,9 +237,9 @@ def _fitted_inertia(found: Found, wave: VaryingInertia, say) -> tuple[VaryingIne
 def _in_whole_recordings(
     found: Found, windows: tuple[Estimator, Estimate]
 ) -> tuple[Estimator, Estimate]:
-    """A law's fit to whole recordings; the one given where parameters alone leave little more.
+    """A law's fit to whole recordings, if it leaves far less than parameters alone; else as given.
 
-    In the noise of the readings no unknown torque explains what the law's values should.
+    In windows an unknown torque may explain in part what the law's values should.
     """
     h, x = windows[1].hypothesis, windows[1].x
     own = in_sensor_noise(found.base_estimator, found.base)

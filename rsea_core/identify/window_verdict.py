@@ -43,7 +43,7 @@ from rsea_core.identify.window_findings import stands
 from rsea_core.identify.window_fit import (
     FoundFit,
     FoundSearch,
-    explain_negligible_torque,
+    explains_only_negligible_torque,
     fit_of,
     late_command,
     leaves_much_torque,
@@ -325,7 +325,7 @@ def with_evidence(
     found, unseen = beyond_chance(found)
     instead = None if found.complete else gain_over_named(found, say)
     fails = found.problem.timing.smooth and fails_in_longer_windows(found, unseen)
-    if instead is not None or fails or explain_negligible_torque(found):
+    if instead is not None or fails or explains_only_negligible_torque(found):
         found, unseen = found.parameters_alone(), None
     return found, unseen, instead
 

@@ -86,7 +86,7 @@ def read_laws(listed: Sequence, where: str) -> tuple[tuple[Law, dict[str, float]
             for name, v in table(entry.get("values", {}), "law.values", RigError).items()
         }
         require_known(values, _value_names(law), f"{where}: law {key}", RigError)
-        faults = (fault_of,) if law.effect == EFFECT else (_below, _lacks)
+        faults = (fault_of,) if law.effect == EFFECT else (_below, _beyond, _lacks)
         fault = next((fault for fault in (f(law, values) for f in faults) if fault), None)
         if fault is not None:
             raise RigError(f"{where}: law {key}: {fault}")
@@ -107,6 +107,23 @@ def _below(law: Law, values: Values) -> str | None:
     for unknown in law.unknowns:
         if unknown.low >= 0.0 and values.get(unknown.name, 0.0) < 0.0:
             return f"{unknown.name} = {values[unknown.name]:g} must not be negative"
+    return None
+
+
+def _beyond(law: Law, values: Values) -> str | None:
+    """A value out of bounds that are the parameter's own, in words; None: there is none.
+
+    Other bounds of a law scale with the machine, which a file of laws does not state.
+    """
+    own = {f.name: f.metadata.get("bounds") for f in fields(law.kind)} if law.kind else {}
+    for unknown in law.unknowns:
+        bounds, value = (unknown.low, unknown.high), values.get(unknown.name)
+        if (
+            value is not None
+            and own.get(unknown.name) == bounds
+            and not bounds[0] <= value <= bounds[1]
+        ):
+            return f"{unknown.name} = {value:g} is outside [{bounds[0]:g}, {bounds[1]:g}]"
     return None
 
 

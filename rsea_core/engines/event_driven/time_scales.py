@@ -19,6 +19,8 @@ def rates_per_s(
 ):
     """How fast the terms' own nonlinearities can pass [1/s], at speeds up to wheel_speed."""
     rates = [fx[e.RIPPLE_CYCLES] * wheel_speed if fx[e.RIPPLE] != 0.0 else 0.0]
+    if fx[e.INERTIA_COSINE] != 0.0 or fx[e.INERTIA_SINE] != 0.0:
+        rates.append(fx[e.INERTIA_CYCLES] * wheel_speed)
     if fx[e.DEAD_TIME] > 0.0 and inductance > 0.0:
         rates.append(fx[e.DEAD_TIME] * supply_V / (fx[e.DEAD_TIME_CURRENT] * inductance))
     smooth = fx[e.GEAR_VISCOUS] + abs(fx[e.VISCOUS_SKEW])

@@ -73,7 +73,8 @@ def resting_joint(plant, fx, y):
         hold += t.load_port(fx, hanging, 0.0)
     if abs(load) <= hold or plant.structure == mp.RIGID_HELD:
         return -load
-    return plant.load_inertia * load / (plant.inertia + plant.load_inertia) - load
+    inertia = plant.load_inertia * e.inertia_factor(fx, y[at.LOAD])[0]
+    return inertia * load / (plant.inertia + inertia) - load
 
 
 @njit(error_model="numpy")

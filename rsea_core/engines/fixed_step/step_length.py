@@ -26,7 +26,7 @@ def longest_step_s(numbers, spring, fx):
         stiffness += fx[e.SLIP_STIFFNESS + j]
     for j in range(e.N_BRANCHES):
         stiffness += fx[e.BRANCH_STIFFNESS + j]
-    gear, load = plant.inertia, plant.load_inertia
+    gear, load = plant.inertia, plant.load_inertia * e.least_inertia_factor(fx)
     tip = fx[e.LINK_INERTIA] if fx[e.LINK_STIFFNESS] > 0.0 else 0.0
     near = load
     output = fx[e.BACKLASH_INERTIA] if fx[e.BACKLASH] > 0.0 else gear

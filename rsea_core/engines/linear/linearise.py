@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+import rsea_core.effects.layout as e
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.engines.event_driven.time_scales import rates_per_s
@@ -153,6 +154,7 @@ def fastest_mode_per_s(plant: mp.Plant, spring: SpringTable) -> float:
 
 def fastest_per_s(plant: mp.Plant, spring: SpringTable, fx: NDArray) -> float:
     """The fastest of the linear modes and of the terms' own nonlinearities [1/s]."""
+    plant = plant._replace(load_inertia=plant.load_inertia * e.least_inertia_factor(fx))
     no_load = plant.volts_per_command / plant.volts_per_speed if plant.volts_per_speed > 0 else 0.0
     of_terms = rates_per_s(
         fx,

@@ -3,7 +3,7 @@
 A body of inertia J(theta) needs the torque J alpha + J' omega^2 / 2 (Lagrange's equation of a
 kinetic energy J omega^2 / 2; Norton, Design of Machinery (2012), section 11.4). Waves of the angle
 times alpha and omega^2 in that proportion are regressed on innovations as the terms of a formula
-(`sparse_regression`). That of the load is then fitted (`LoadInertiaVariation`).
+(`sparse_regression`). The inertia of the load is then fitted (`LoadInertiaVariation`).
 """
 
 from dataclasses import dataclass

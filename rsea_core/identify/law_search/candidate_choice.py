@@ -67,14 +67,15 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
     """The candidates beside what was found, from every screening."""
     estimator, base, first = found.estimator, found.best, not found.steps
     left = _left(found, laws)
-    screened = screen(estimator, base, left)
+    projection = Projection(estimator, base)
+    screened = screen(estimator, base, left, projection=projection)
     if first:
         found.screened = screened
     short = None
     if found.horizon is None or found.horizon > SHORT:
         short = estimator.having(with_windows(estimator, SHORT))
-    orders = along_motion(Projection(estimator, base), left)
-    chosen = standing_out(_by_held_out([*screened, *orders]), estimator.tempering)
+    both = sorted([*screened, *along_motion(projection, left)], key=lambda c: -c.held_out)
+    chosen = standing_out(both, estimator.tempering)
     once = any(law.effect == LoadDisturbance.effect for law in base.hypothesis.laws)
     if not (once or (quick and not first)):  # a second law needs the test by whole recordings
         chosen += pulses(Projection(without_slow_torque(estimator), base))[:PULSES]
@@ -100,7 +101,7 @@ def promising(found: Found, laws: Sequence[Law], *, quick: bool) -> Choice:
 def _where_predicted_closely(found: Found) -> Estimator | None:
     """The next shorter windows, if the fit before errs by much in those judged.
 
-    A law over the angle has many minima where the simulated angle is a wave or more away.
+    Where the simulated angle errs by a period of the law or more, its fit has many minima.
     """
     own, best = found.estimator, found.best
     at = HORIZONS.index(found.horizon)
@@ -148,10 +149,6 @@ def _new(candidates: Sequence[Candidate], chosen: Sequence[Candidate]) -> list[C
 
 def _from(fit: Estimate, candidates: Sequence[Candidate]) -> list[Candidate]:
     return [replace(c, start_values=fit.x) for c in candidates]
-
-
-def _by_held_out(candidates: Sequence[Candidate]) -> list[Candidate]:
-    return sorted(candidates, key=lambda c: -c.held_out)
 
 
 def standing_out(screened: Sequence[Candidate], tempering: float) -> list[Candidate]:

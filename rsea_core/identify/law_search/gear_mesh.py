@@ -37,10 +37,10 @@ def encoders_disagree(found: Found) -> bool:
 
 
 def shows_lost_motion(case: Case) -> bool:
-    """Whether the readings alone show backlash in a train without a spring, before any fit.
+    """Whether the readings alone, before any fit, show backlash in a train without a spring.
 
-    The encoders then differ by more than noise, and by neither an offset, a factor, a late reading
-    nor waves over the turns of wheel and worm, as a transmission error has.
+    Their difference then exceeds the noise, and no offset, scale factor or delay of a reading and
+    no transmission error (periodic in the turns of wheel and worm) accounts for it.
     """
     rig = case.rig
     if rig.has("spring") or not rig.has("gear"):
@@ -50,7 +50,7 @@ def shows_lost_motion(case: Case) -> bool:
 
 
 def _left_by_harmonics(r: Recording, rig: Rig) -> float:
-    """Difference of the angles that a rigid train with a transmission error leaves, in floors."""
+    """Difference of the angles [noise floors] that these leave (`shows_lost_motion`)."""
     ratio = rig.gear_ratio or 1.0
     wheel = r["motor_angle_rad"] / ratio
     smooth = [np.ones_like(wheel), wheel, np.gradient(wheel, r.time_s)]

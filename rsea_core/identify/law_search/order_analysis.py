@@ -23,7 +23,7 @@ AMPLITUDES, CYCLES = ("sin_Nm", "cos_Nm"), "cycles_per_rev"
 def along_motion(projection: Projection, laws: Sequence[Law]) -> list[Candidate]:
     """Cogging of one wave, the largest held-out gain first.
 
-    Of a law whose number of cycles is free that of all its starts is given which gains most. Start
+    Of a law with a free number of cycles, the start with the largest held-out gain is given. Start
     and gain of a candidate are those of the regression.
     """
     if "G" not in ports(projection.estimator.tracks[0]):

@@ -126,7 +126,12 @@ def _block_of_each(tracks: Sequence[Track]) -> NDArray:
 
 
 def screen(
-    estimator: Estimator, fit: Estimate, laws: Sequence[Law], *, wrong_signs: bool = False
+    estimator: Estimator,
+    fit: Estimate,
+    laws: Sequence[Law],
+    *,
+    wrong_signs: bool = False,
+    projection: Projection | None = None,
 ) -> list[Candidate]:
     """Candidates, the largest held-out gain first; no laws that follow another one.
 
@@ -135,28 +140,19 @@ def screen(
     wrong_signs : bool
         Also laws whose linearised size is negative where only a positive one is physical, with
         no gain: parameters biased by the missing law can turn its sign.
+    projection : Projection or None
+        Of that estimator and fit; None: it is made here.
     """
     laws = [law for law in laws if not law.follows]
-    problem, projection = estimator.problem, Projection(estimator, fit)
-    n = len(problem.nominals)
+    projection = projection or Projection(estimator, fit)
     jobs = [
-        (law, begin, start)
+        (law, start)
         for law in laws
         for begin in law.starts
         for start in (begin, quarter_turn(law, begin))
         if start is not None
     ]
-    columns: dict[tuple, NDArray] = {}
-    for at in range(0, len(jobs), BATCH):
-        part = jobs[at : at + BATCH]
-        trials = []
-        for law, _, start in part:
-            own = problem.start(Hypothesis(laws=(law,)), [start])[n:]
-            h = Hypothesis(laws=(*fit.hypothesis.laws, law))
-            trials.append((h, np.concatenate([fit.x, own])))
-        found = estimator.innovations(trials)
-        for j, (law, _, start) in enumerate(part):
-            columns[law.key, start] = projection.column([e[j] for e in found])
+    columns = _columns(projection, jobs)
     best: dict[str, Candidate] = {}
     for law in laws:
         for start in law.starts:
@@ -182,8 +178,32 @@ def screen(
     return sorted(best.values(), key=lambda c: -c.held_out)
 
 
+def _columns(
+    projection: Projection, jobs: Sequence[tuple[Law, tuple[float, ...]]]
+) -> dict[tuple, NDArray]:
+    """Column of each law and start, by the law's key and the start."""
+    estimator, fit = projection.estimator, projection.fit
+    problem, columns = estimator.problem, {}
+    n = len(problem.nominals)
+    for at in range(0, len(jobs), BATCH):
+        part = jobs[at : at + BATCH]
+        trials = []
+        for law, start in part:
+            own = problem.start(Hypothesis(laws=(law,)), [start])[n:]
+            h = Hypothesis(laws=(*fit.hypothesis.laws, law))
+            trials.append((h, np.concatenate([fit.x, own])))
+        found = estimator.innovations(trials)
+        for j, (law, start) in enumerate(part):
+            columns[law.key, start] = projection.column([e[j] for e in found])
+    return columns
+
+
 def screen_again(
-    estimator: Estimator, fit: Estimate, candidates: Sequence[Candidate]
+    estimator: Estimator,
+    fit: Estimate,
+    candidates: Sequence[Candidate],
+    *,
+    projection: Projection | None = None,
 ) -> list[Candidate]:
     """Candidates screened at the sizes that a first screening found.
 
@@ -196,7 +216,8 @@ def screen_again(
     """
     known = {c.law.key: c.law for c in candidates}
     begun = [replace(c.law, starts=_starts_again(c)) for c in candidates]
-    again = [replace(c, law=known[c.law.key]) for c in screen(estimator, fit, begun)]
+    screened = screen(estimator, fit, begun, projection=projection)
+    again = [replace(c, law=known[c.law.key]) for c in screened]
     best: dict[str, Candidate] = {}
     pairs = {c.law.key for c in again if quarter_turn(c.law, c.start) is not None}
     first = [c for c in candidates if c.law.key not in pairs]

@@ -61,7 +61,7 @@ class Shape:
 
     @property
     def subsystem(self) -> str:
-        """Part of the machine: what follows command or current is the drive's."""
+        """Part of the machine; the drive, if the shape depends on command or current."""
         return "drive" if self.signal in ("command", "current") else PORTS[self.port]
 
 

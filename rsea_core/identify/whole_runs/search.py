@@ -127,9 +127,9 @@ class WholeSearch(TakenLaws):
         """Candidates fitted beside what was taken, best first."""
         have = {(law.effect, law.sensor) for law in self.taken}
         left = [w for w in self.laws if (w.effect, w.sensor) not in have]
-        screened = screen(self.own, self.fit, left, wrong_signs=True)
-        screened = screen_again(self.own, self.fit, screened)
         projection = Projection(self.own, self.fit)
+        screened = screen(self.own, self.fit, left, wrong_signs=True, projection=projection)
+        screened = screen_again(self.own, self.fit, screened, projection=projection)
         if (LoadDisturbance.effect, None) not in have:
             screened += pulses(projection)[:PULSES]
         candidates = most_promising(screened) + self.of_free_pitch(left)
@@ -142,13 +142,13 @@ class WholeSearch(TakenLaws):
         return sorted(trials, key=lambda t: -t.gain)
 
     def of_free_pitch(self, laws: Sequence[Law]) -> list[Candidate]:
-        """Waves that may have any length, begun at the length that windows show.
+        """Cogging of a free pitch, from the pitch that windows show.
 
-        Errors of whole recordings accumulate, so that a wave of almost any length lowers them.
+        Errors of whole recordings accumulate, so that almost any pitch lowers them.
         """
         laws = [law for law in laws if law.kind is MotorCogging and not law.fixed_numbers]
-        in_windows = Projection(self.found.base_estimator, self.found.base) if laws else None
-        return along_motion(in_windows, laws) if laws else []
+        base = self.found.base_estimator, self.found.base
+        return along_motion(Projection(*base), laws) if laws else []
 
     def fitted(
         self, base: Estimate, candidates: Sequence[Candidate], quick: Estimator | None = None,

@@ -67,3 +67,14 @@ def test_energy_is_kept_behind_a_spring():
 def test_more_than_two_thirds_in_one_part_is_refused():
     with pytest.raises(TermError, match="cosine_share"):
         LoadInertiaVariation(cosine_share=0.9)
+
+
+def test_the_step_follows_the_smallest_inertia_of_the_load():
+    """A load that is thirty times as light in some positions, on a stiff spring."""
+    light = LoadInertiaVariation(cosine_share=0.66, sine_share=0.66, cycles_per_rev=4.0)
+    model = ActuatorModel(RIG, (light,))
+    inputs = Inputs(time_s=TIME_s, duty=0.5 * np.sin(5.0 * TIME_s), load=Load(kind="pendulum"))
+    run = simulate(model, inputs)
+    finer = simulate(model, inputs, step_s=2e-5)
+    np.testing.assert_allclose(run.load_angle_rad, finer.load_angle_rad, rtol=0.0, atol=1e-6)
+    assert np.max(np.abs(run.energy.imbalance_J())) < 1e-6 * np.max(run.energy.supplied_J)

@@ -9,7 +9,7 @@ from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.identify.multistep.criteria import UNKNOWN_SHARE
 from rsea_core.identify.multistep.noise_estimate import SLOW_INPUT
 from rsea_core.identify.window_diagnosis import diagnose_windows, place_of_unknown
-from rsea_core.identify.window_fit import explain_negligible_torque
+from rsea_core.identify.window_fit import explains_only_negligible_torque
 from rsea_core.machine.inputs import Inputs, Load
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.recording import Recording
@@ -66,7 +66,7 @@ def test_laws_of_windows_explain_nothing_where_hardly_a_torque_is_unknown(
     found = SimpleNamespace(
         complete=complete, steps=[step], base_estimator=SimpleNamespace(tracks=[track])
     )
-    assert explain_negligible_torque(found) == negligible
+    assert explains_only_negligible_torque(found) == negligible
 
 
 @pytest.mark.parametrize(("gain", "place"), [(20.0, "drive"), (60.0, "sensor:current_A")])

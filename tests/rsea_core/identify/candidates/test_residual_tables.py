@@ -157,6 +157,12 @@ def test_a_table_of_the_load_is_the_terms_law():
         ("gear-friction", "coulomb", {}, "lacks coulomb_Nm"),
         ("gear-transmission-error", "worm", {"worm_cos_rad": 1e-3}, "lacks worm_sin_rad"),
         ("drive-saturation", "sag", {"source_resistance_ohm": -3.0}, "must not be negative"),
+        (
+            "load-inertia-variation",
+            "harmonic",
+            {"cosine_share": 3.0},
+            "cosine_share = 3 is outside",
+        ),
     ],
 )
 def test_a_law_in_a_file_that_lacks_values_or_cannot_be_is_reported_in_one_line(

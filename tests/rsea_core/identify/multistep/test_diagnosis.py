@@ -87,7 +87,7 @@ def test_a_torque_constant_that_falls_with_the_current_is_a_formula_and_no_curre
 
 
 def test_what_the_data_cannot_decide_gets_an_experiment_that_would(tmp_path, monkeypatch):
-    monkeypatch.setattr(window_verdict, "explain_negligible_torque", lambda found: False)
+    monkeypatch.setattr(window_verdict, "explains_only_negligible_torque", lambda found: False)
     found = diagnose_windows(axis(tmp_path, GearFriction(coulomb_Nm=5e-5)), quick=True).conclusion
     found.verdict = "insufficient-data"  # at this size it is, or nearly so
     wanted = decisive_experiment(found)

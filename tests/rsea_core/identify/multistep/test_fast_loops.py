@@ -160,6 +160,6 @@ def test_laws_that_fail_in_longer_windows_are_dropped_where_commands_are_smoothe
     monkeypatch.setattr(window_verdict, "beyond_chance", lambda found: (found, None))
     monkeypatch.setattr(window_verdict, "gain_over_named", lambda found, say: None)
     monkeypatch.setattr(window_verdict, "fails_in_longer_windows", lambda found, unseen: True)
-    monkeypatch.setattr(window_verdict, "explain_negligible_torque", lambda found: False)
+    monkeypatch.setattr(window_verdict, "explains_only_negligible_torque", lambda found: False)
     monkeypatch.setattr(CommandTiming, "smooth", smooth)
     assert len(with_evidence(search, lambda text: None)[0].steps) == kept
