@@ -26,6 +26,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from rsea_core.effects.slots import USER_PLACES, block, slots
+from rsea_core.numeric.source_version import SOURCE_VERSION
 
 PORTS = ("output_torque", "load_torque", "load_friction")
 N_ARRAY_MOST = 1024  # numbers of a machine, at most
@@ -76,22 +77,33 @@ def folded(port: str) -> Hook:
 
 def summed(port: str, fx: NDArray, angles: NDArray, speeds: NDArray) -> NDArray:
     """What all hooks of a port make at angles and speeds (n,): (n,) array, for drawing."""
-    return _at_each(port)(fx, angles, speeds)
+    return _at_each()(PORTS.index(port), fx, angles, speeds)
 
 
 @cache
-def _at_each(port: str) -> Callable[[NDArray, NDArray, NDArray], NDArray]:
-    """A port's hooks over arrays, compiled once: a curve with its band asks a hundred times."""
-    law = folded(port)
+def _at_each() -> Callable[[int, NDArray, NDArray, NDArray], NDArray]:
+    """A port's hooks over arrays, kept on disk: to compile takes five seconds.
 
-    @njit(error_model="numpy")
-    def at_each(fx, angles, speeds):
-        found = np.empty(angles.size)
+    The laws are globals: numba's cache has no key for compiled functions in a closure.
+    """
+    global _output_torque, _load_torque, _load_friction
+    _output_torque, _load_torque, _load_friction = (folded(port) for port in PORTS)
+    return _cached(SOURCE_VERSION)
+
+
+def _cached(version):
+    def at_each(port, fx, angles, speeds):
+        found = np.zeros(angles.size + version * 0)
         for j in range(angles.size):
-            found[j] = law(fx, angles[j], speeds[j], 0.0)
+            if port == 0:
+                found[j] = _output_torque(fx, angles[j], speeds[j], 0.0)
+            elif port == 1:
+                found[j] = _load_torque(fx, angles[j], speeds[j], 0.0)
+            else:
+                found[j] = _load_friction(fx, angles[j], speeds[j], 0.0)
         return found
 
-    return at_each
+    return njit(cache=True, error_model="numpy")(at_each)
 
 
 def _after(first: Hook, second: Hook) -> Hook:

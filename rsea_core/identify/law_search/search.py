@@ -17,6 +17,7 @@ from rsea_core.effects.sensor_noise import SensorNoise
 from rsea_core.effects.sensor_offset import SensorOffset
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
+from rsea_core.identify.candidates.angle_relation import angle_relation
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.candidate_choice import Choice, promising
@@ -117,11 +118,14 @@ def searched(
 
 def laws_of(found: Found) -> list[Law]:
     """Every law that the case can have and its rows can show."""
+    case = found.problem.case
     meshes = any(law.effect == MESH_DAMPER for law in found.base.hypothesis.laws)
+    relation = None if meshes else angle_relation(case)
     return [
-        law for law in catalogue(found.problem.case, relative=True).values()
+        law for law in catalogue(case, relative=True).values()
         if law.effect not in HOLDS_NO_CLAIM
         and not (meshes and law.subsystem == "spring")
+        and not (relation is not None and relation.refutes(law))
         and _observable(law, found.base_estimator)
     ]  # fmt: skip
 

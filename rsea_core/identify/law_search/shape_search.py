@@ -15,6 +15,7 @@ from scipy.linalg import expm
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.engines.linear.linearise import linear_plant
+from rsea_core.identify.candidates.angle_relation import angle_relation
 from rsea_core.identify.fitting.problem import machine_of
 from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.multistep.tracks import Track
@@ -66,10 +67,16 @@ class Shape:
 
 
 def shapes(projection: Projection) -> list[Shape]:
-    """Shapes at all ports over all signals, the largest held-out gain first."""
-    tracks = projection.estimator.tracks
-    found = []
+    """Shapes at all ports over all signals, the largest held-out gain first.
+
+    None in a spring that the readings show to be linear.
+    """
+    tracks, found = projection.estimator.tracks, []
+    relation = angle_relation(projection.estimator.problem.case)
+    linear = relation is not None and relation.spring_is_linear
     for port in ports(tracks[0]):
+        if port == "S" and linear:
+            continue
         scale = max(_scale(t, port) for t in tracks)  # one function for all recordings
         for signal, friction in _signals(tracks[0], port):
             values = [_signal(t, signal) for t in tracks]

@@ -20,6 +20,7 @@ from rsea_core.identify.multistep.criteria import (
     LEAST_GAIN,
     LEAST_OF_LEFT,
     LEFT_OF_EACH,
+    MOST_LEFT,
     MUCH_LEFT,
     NEARLY_EXPLAINED,
     NOISE_RENEWED,
@@ -127,7 +128,8 @@ def _laws_added(
             break
         if not search.add(say):
             break
-        if found.unpredicted and search.left() > MUCH_LEFT * left:
+        little = len(search.taken) == 1 and search.excess() > MOST_LEFT * found.excess
+        if little or (found.unpredicted and search.left() > MUCH_LEFT * left):
             say("whole recordings: no law predicts them; no further one is added")
             return found, search
         search.prune(say)
