@@ -12,9 +12,9 @@ from rsea_core.effects.drive_nonlinear_gain import with_nonlinear_gain
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.slots import slots
 from rsea_core.effects.typical import TypicalMagnitudes
-from rsea_core.effects.variant import Law, Unknown, writes_numbers
+from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, writes_numbers
 
-COMMAND_OFFSET = slots("command_offset")
+COMMAND_OFFSET, COMMAND_DRIFT = slots("command_offset", "command_drift")
 
 
 @njit(error_model="numpy", inline="always")
@@ -74,6 +74,34 @@ class DriveOffset(Term):
         return Law(
             effect=cls.effect, law=cls.law, subsystem="drive", kind=cls,
             write=writes_numbers(cls), unknowns=(offset,), starts=((0.0,),), nuisance=True,
+        )  # fmt: skip
+
+    @classmethod
+    def drift(cls, file: str, span: float, prior: float, duration_s: float) -> Law:
+        """A slow change of the offset in one recording, which no other one inherits.
+
+        Parameters
+        ----------
+        file : str
+            The recording's.
+        span, prior
+            As in `nuisance`: the offset that the drift adds by the end, as a share of `span`.
+        duration_s : float
+            Of the recording.
+        """
+        most = span / duration_s
+        rate = Unknown(
+            name="drift_per_s", unit="1/s", low=-most, high=most, scale=0.1 * prior * most,
+            prior=prior * most,
+        )  # fmt: skip
+
+        def write(v: Mapping[str, float], d: TrialMachine, w: RunConditions) -> None:
+            if w.file == file:
+                d.put(COMMAND_DRIFT, v["drift_per_s"])
+
+        return Law(
+            effect=cls.effect, law="drift", subsystem="drive", kind=cls, only=file, write=write,
+            unknowns=(rate,), starts=((0.0,),), nuisance=True,
         )  # fmt: skip
 
     @classmethod

@@ -25,7 +25,11 @@ from rsea_core.effects.drive_dead_zone import (  # noqa: F401
     servo_torque,
 )
 from rsea_core.effects.drive_delay import COMMAND_DELAY  # noqa: F401
-from rsea_core.effects.drive_offset import COMMAND_OFFSET, acting_command  # noqa: F401
+from rsea_core.effects.drive_offset import (  # noqa: F401
+    COMMAND_DRIFT,
+    COMMAND_OFFSET,
+    acting_command,
+)
 from rsea_core.effects.drive_saturation import (  # noqa: F401
     SOURCE_ONE_DIRECTION,
     SOURCE_RESISTANCE,

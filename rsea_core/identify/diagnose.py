@@ -89,7 +89,10 @@ def diagnose(
         if not quick and (_leaves_much(found) or _may_be_an_offset(case, found)):
             say("laws leave much, or an offset imitates one: a second opinion by windows")
             other = diagnose_windows(case, thorough=thorough, say=say)
-            return other if other.conclusion.found.complete else found
+            if other.conclusion.found.complete:
+                return other
+            unnamed = case.validation and found.document["verdict"] == "unexplained"
+            return _better(found, lambda: other, say) if unnamed else found
         if quick or not case.validation or found.document["verdict"] != "unexplained":
             return found
         say("no name fits: a second opinion by windows, which model the errors of the log")

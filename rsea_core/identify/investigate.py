@@ -48,6 +48,7 @@ from rsea_core.identify.whole_runs.complete import (
     of_first_growth,
     with_whole_runs,
 )
+from rsea_core.identify.whole_runs.offset_drift import with_offset_drift
 from rsea_core.identify.whole_runs.parameters_alone import found_sound
 from rsea_core.identify.whole_runs.sensor_noise import (
     converged,
@@ -114,6 +115,8 @@ def _searched(
         wanted = nearly is not None and nearly.explained > NEEDS_NO_WINDOWS
         if wanted and not no_work_left():
             found = _with_gear_mesh_in_whole_runs(case, nearly, say)
+        if nearly is None and not found.complete:
+            found = with_offset_drift(found, say)
     if not (found.complete or found.sound):
         brief = quick or no_work_left()
         add_all(found, laws_of(found), say, quick=brief)

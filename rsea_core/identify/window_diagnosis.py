@@ -102,8 +102,8 @@ def _model_laws(conclusion: WindowVerdict) -> tuple:
 
 
 def _kept(law, values) -> bool:
-    """Whether a law belongs into a model: clocks are the log's, and a zero is none."""
-    if law.effect in OF_THE_LOG:
+    """Whether a law belongs into a model: clocks and drifts are the log's, and a zero is none."""
+    if law.effect in OF_THE_LOG or (law.nuisance and law.only is not None):
         return False
     return not law.nuisance or any(value != 0.0 for value in values.values())
 
@@ -338,6 +338,8 @@ def _nuisance_text(law, value: float, std: float, span: float) -> str:
 
     span : largest command
     """
+    if law.nuisance and law.only is not None:
+        return f"the drive's offset drifts by {value:.2g} +- {std:.1g} a second in {law.only}"
     if law.kind is DriveOffset:
         if abs(value) < NEGLIGIBLE_OFFSET * span:
             return ""

@@ -61,7 +61,7 @@ def axis_rig(units: Units = Units(), *, off: float = 1.0, counts: int = COUNTS) 
 def axis_recording(
     *terms, seed: int, units: Units = Units(), offset_A: float = 0.0, delay_rows: float = 0.0,
     linear: bool = False, role: str = "identification", uneven: float = 0.0,
-    rig: Rig | None = None, two_levels: bool = False,
+    rig: Rig | None = None, two_levels: bool = False, drift_A_per_s: float = 0.0,
 ) -> Recording:  # fmt: skip
     """Twelve seconds of an axis (in the unit of time) that is driven to and fro, read by counts.
 
@@ -73,6 +73,8 @@ def axis_recording(
         Of the machine; None: `axis_rig`.
     two_levels : bool
         One size of the command, of both signs, after a second of zero.
+    drift_A_per_s : float
+        Of the amplifier's offset, in a second of bench units, in no column of the log.
     """
     rng = np.random.default_rng(seed)
     n = 1200
@@ -88,7 +90,8 @@ def axis_recording(
         own.append(DriveOffset(offset=offset_A))
     if delay_rows:
         own.append(DriveDelay(delay_s=delay_rows * ROW_s * units.time))
-    inputs = Inputs(time_s=time, current_command_A=current, load=Load(kind="free"))
+    acting = current + drift_A_per_s * tau
+    inputs = Inputs(time_s=time, current_command_A=acting, load=Load(kind="free"))
     finer = 1
     if linear:
         finer = 3

@@ -200,7 +200,7 @@ def _is_plain(plant, fx):
         allowed = j == e.ANY or e.WHEEL_DRY <= j <= e.GEAR_BACKWARD or j == e.LOAD_DRY
         allowed = allowed or j == e.LOAD_COULOMB or j == e.GEAR_DRIVE_LOSS
         allowed = allowed or j == e.GEAR_BACKDRIVE_LOSS or j == e.DEAD_ZONE or j == e.COMMAND_DELAY
-        allowed = allowed or j == e.COMMAND_OFFSET or j == e.ROUNDED_ZONE
+        allowed = allowed or j == e.COMMAND_OFFSET or j == e.COMMAND_DRIFT or j == e.ROUNDED_ZONE
         plain = plain and (allowed or fx[j] == 0.0)
     return plain
 

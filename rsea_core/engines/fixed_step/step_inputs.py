@@ -187,7 +187,8 @@ def piece_of(machine, fx, row, time, command, n, offset, latest):
     if machine.servo:  # its goal before the first one is that one
         acts = goal_of(machine.plant, time, command, max(acting, 0)) + fx[e.COMMAND_OFFSET]
     else:
-        acts = acting_command(fx, command[acting] if acting >= 0 else 0.0)
+        given = command[acting] if acting >= 0 else 0.0
+        acts = acting_command(fx, given + fx[e.COMMAND_DRIFT] * time[row.index])
     torque, length = 0.0, end - offset
     if machine.plant.drive == mp.MOTOR_TORQUE and row.closed:
         torque = machine.plant.torque_per_motor_torque * acts

@@ -103,6 +103,7 @@ START_ERROR = 0.01  # of an angle's spread: a start at rest that smoothing misse
 SHAPE_SHARE = 0.5  # of the excess of parameters alone: least held-out gain of a shape
 OVERSTATED_NOISE = 0.7  # misfit with laws, below which noise was estimated far too large
 NOISE_RENEWED = 3  # times that laws are then searched in the noise that they leave, at most
+DRIFT_LEAVES, DRIFT_SHARE = 1.2, 0.5  # misfit with drifts of the amplifier; share they explain
 MOST_LEFT = 0.67  # of the misfit's cost: a first law that leaves more is the last
 MUCH_LEFT = 0.3  # of the misfit: a law that leaves more is the last, where nothing predicts
 COMPLETE_SHARE = 0.08  # or of what parameters alone leave: small things that every machine has

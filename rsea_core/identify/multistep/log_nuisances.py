@@ -70,6 +70,19 @@ def nuisances(case: Case) -> tuple[Law, ...]:
     return (DriveOffset.nuisance(max(span, full), OFFSET_PRIOR), late, *clocks, *lags)
 
 
+def offset_drifts(case: Case) -> tuple[Law, ...]:
+    """A drift of the amplifier's zero in each recording that is fitted; none of a servo."""
+    driven = [r for r in case.identification if r.command_name in COMMANDS]
+    if any(r.command_name == POSITION_COMMAND for r in driven):
+        return ()
+    full = OF_FULL_SCALE * (_full_scale(driven[0].command_name, case.rig) or 0.0) if driven else 0.0
+    span = max([full, *map(_span, driven)])
+    return tuple(
+        DriveOffset.drift(r.file, span, OFFSET_PRIOR, float(r.time_s[-1] - r.time_s[0]))
+        for r in driven if span > 0.0
+    )  # fmt: skip
+
+
 def _span(r: Recording) -> float:
     """Largest command; of goals the largest distance from their mean: an angle has no zero."""
     command = r[r.command_name]

@@ -10,16 +10,12 @@ from dataclasses import replace
 import numpy as np
 
 from rsea_core.effects.drive_dead_zone import DriveDeadZone
+from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.sensor_scale import SensorScale
 from rsea_core.effects.variant import Law
-from rsea_core.identify.law_search.candidate_fits import (
-    at_bound,
-    count_values,
-    fitted,
-    settled,
-)
+from rsea_core.identify.law_search.candidate_fits import at_bound, count_values, fitted, settled
 from rsea_core.identify.law_search.order_analysis import along_motion
 from rsea_core.identify.law_search.pulses import pulse_ratio, pulses
 from rsea_core.identify.law_search.screening import Candidate, Projection, screen, screen_again
@@ -377,7 +373,8 @@ def plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
     Every machine has friction: where it explains as much, no dead zone of the drive is named.
-    Encoders have whole counts: where a spring explains as much, no scale factor of an angle is.
+    Encoders have whole counts, and gears are cut closely: where a spring explains as much, no scale
+    factor of an angle and no transmission error is; where a scale factor does, no such error.
     Uneven rows of a log leave an error in proportion to the gain, which further values can fit.
     Of equally plain laws one that keeps the machine close to its rig file is taken unless it gains
     far less: two encoders that disagree by a factor do not tell which of them is wrong. What acts
@@ -389,6 +386,7 @@ def plainest(trials: Sequence[Trial], doubt: float) -> Trial:
 
     def complexity(t: Trial) -> tuple[bool, bool, int]:
         of_angle = t.law.effect == SensorScale.effect and t.law.sensor in ANGLES
+        of_angle |= t.law.effect == GearTransmissionError.effect
         return t.law.effect == DriveDeadZone.effect, of_angle, count_values(t.law)
 
     def cost(t: Trial) -> float:
