@@ -113,8 +113,11 @@ def initial_motion(
     first = first_speed(angle[: LENGTHS[0]], r.sample_time_s, noise)
     if abs(first.speed) <= MOVING * first.std:
         return None
-    window = max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
-    largest = np.max(np.abs(angle[window:] - angle[:-window])) / (window * r.sample_time_s)
+    short, long = LENGTHS[0] - 1, max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
+    # over less than a cycle of a fast oscillation too; what noise adds there is taken off
+    ways = {rows: np.max(np.abs(angle[rows:] - angle[:-rows])) for rows in (short, long)}
+    ways[short] -= MOVING * noise
+    largest = max(way / (rows * r.sample_time_s) for rows, way in ways.items())
     return first if abs(first.speed) > least * largest else None
 
 

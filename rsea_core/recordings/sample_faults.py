@@ -8,6 +8,7 @@ from rsea_core.recordings.recording import Recording
 
 STILL_s, STILL_SHARE = 0.3, 0.1  # a reading stands still for so long, and for this share of rows
 JUMP = 30.0  # times the steps that nine of ten rows keep to: no inertia allows it
+ALONE = 4.0  # times the steps before and after: an oscillation that decays has large ones in a row
 FLAT_s = 0.02  # a noisy reading that stays at its extreme for this long is cut off
 OUTER = 0.1  # of the largest reading: a drive that is off reads nothing for long, and is not cut
 AT_ONCE_s = 0.01  # in which no motor or link stops from a good part of its largest speed
@@ -74,7 +75,9 @@ def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
         return [_jump(r, name, float(alone[k - 1]), text, Kind.SPIKE)]
     if not name.endswith("angle_rad"):
         return []
-    far = np.flatnonzero(np.abs(steps) > limit)
+    sizes = np.pad(np.abs(steps), 1)
+    alone = sizes[1:-1] > ALONE * np.maximum(sizes[:-2], sizes[2:])
+    far = np.flatnonzero((sizes[1:-1] > limit) & alone)
     if not far.size:
         return []
     k = int(far[0])

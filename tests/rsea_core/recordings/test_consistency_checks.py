@@ -14,9 +14,10 @@ from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.consistency_checks import inconsistencies, zeros_and_jumps
 from rsea_core.recordings.finding import Kind, sentences
+from rsea_core.recordings.initial_speed import initial_motion
 from rsea_core.recordings.quality_checks import data_errors, data_warnings
 from rsea_core.recordings.recording import Recording
-from rsea_core.recordings.sample_faults import longest_constant_run
+from rsea_core.recordings.sample_faults import jumps, longest_constant_run
 
 RIG = replace(Rig.preset("rsea-bench"), torque_sensor_noise_Nm=0.02, current_sensor_noise_A=0.005)
 ROWS, ROW_s = 4000, 0.001
@@ -120,6 +121,29 @@ def test_a_wrong_sign_unit_or_sensor_is_reported_with_its_column(what):
     case = Case(name="c", folder=Path(), rig=RIG, recordings=(r,))
     assert set(found) <= set(data_warnings(case))
     assert set(found) <= set(data_errors(case))
+
+
+def released(*, step_rad: float = 0.0) -> Recording:
+    """An oscillation of 27 rows a cycle from rest, which soon decays; then a step."""
+    t = ROW_s * np.arange(ROWS)
+    count, decay, rate = 1e-4, 12.0, 2.0 * np.pi * 37.0
+    cycles = np.cos(rate * t) + decay / rate * np.sin(rate * t)
+    angle = 0.1 * np.exp(-decay * t) * cycles + step_rad * (t > 3.0)
+    return Recording(
+        file="a.csv", load=Load(kind="pendulum"), sample_time_s=ROW_s,
+        columns={"time_s": t, "duty": 0.0 * t, "load_angle_rad": count * np.round(angle / count)},
+    )  # fmt: skip
+
+
+def test_a_fast_oscillation_that_decays_neither_jumps_nor_begins_in_motion():
+    r = released()
+    assert jumps(r, "load_angle_rad", 1e-4 / np.sqrt(12.0)) == []
+    assert initial_motion(r, "load_angle_rad", 1e-4 / np.sqrt(12.0)) is None
+
+
+def test_a_step_after_the_oscillation_has_decayed_is_a_jump():
+    (found,) = jumps(released(step_rad=0.02), "load_angle_rad", 1e-4 / np.sqrt(12.0))
+    assert "jumps by 0.02 rad at 3.001 s" in found.text
 
 
 @pytest.mark.parametrize("factor", [60.0, 10.0])
