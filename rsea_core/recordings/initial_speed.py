@@ -115,9 +115,9 @@ def initial_motion(
         return None
     short, long = LENGTHS[0] - 1, max(2, min(round(0.05 / r.sample_time_s), r.rows // 10))
     # over less than a cycle of a fast oscillation too; what noise adds there is taken off
-    ways = {rows: np.max(np.abs(angle[rows:] - angle[:-rows])) for rows in (short, long)}
-    ways[short] -= MOVING * noise
-    largest = max(way / (rows * r.sample_time_s) for rows, way in ways.items())
+    distances = {rows: np.max(np.abs(angle[rows:] - angle[:-rows])) for rows in (short, long)}
+    distances[short] -= MOVING * noise
+    largest = max(distance / (rows * r.sample_time_s) for rows, distance in distances.items())
     return first if abs(first.speed) > least * largest else None
 
 
