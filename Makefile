@@ -17,7 +17,7 @@ GIVEN := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, 
 	model = ActuatorModel(Rig.preset('rsea-bench'))
 
 # tests that compile what a diagnosis needs beside the engines
-ONE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 0
+COMPILE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 0
 WINDOWS := tests/rsea_core/identify/multistep/test_diagnosis.py::test_one_recording_of_a_bare_pendulum_shows_its_dry_friction
 FREE_RUNS := tests/rsea_core/effects/test_planted_effects.py::test_a_diagnosis_names_fits_and_writes_it_and_its_file_predicts
 
@@ -50,7 +50,7 @@ $(VENV)/.test: $(VENV)/.study
 	@$(BIN)/python -c "$(GIVEN); Replay.of(given).run(model)" & others=$$!; \
 		$(BIN)/python -c "$(GIVEN); simulate(model, given); simulate(model, given, engine='event-driven')"; engine=$$?; \
 		wait $$others && exit $$engine
-	@$(ONE) $(WINDOWS) > /dev/null 2>&1 & others=$$!; $(ONE) $(FREE_RUNS) > /dev/null 2>&1; wait $$others; true
+	@$(COMPILE) $(WINDOWS) > /dev/null 2>&1 & others=$$!; $(COMPILE) $(FREE_RUNS) > /dev/null 2>&1; wait $$others; true
 	@touch $@
 
 study: $(VENV)/.study

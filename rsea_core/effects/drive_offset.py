@@ -19,7 +19,7 @@ COMMAND_OFFSET, COMMAND_DRIFT = slots("command_offset", "command_drift")
 
 @njit(error_model="numpy", inline="always")
 def acting_command(fx, command):
-    """What a drive makes of a command: its amplifier's zero added, dead zone, then its gain."""
+    """What a drive makes of a command: its amplifier's offset added, dead zone, then its gain."""
     return with_nonlinear_gain(fx, beyond_dead_zone(fx, command + fx[COMMAND_OFFSET]))
 
 

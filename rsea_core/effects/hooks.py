@@ -82,7 +82,7 @@ def summed(port: str, fx: NDArray, angles: NDArray, speeds: NDArray) -> NDArray:
 
 @cache
 def _at_each() -> Callable[[int, NDArray, NDArray, NDArray], NDArray]:
-    """A port's hooks over arrays, kept on disk: to compile takes five seconds.
+    """A port's hooks over arrays, compiled once and kept on disk.
 
     The laws are globals: numba's cache has no key for compiled functions in a closure.
     """

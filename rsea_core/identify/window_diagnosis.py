@@ -339,7 +339,7 @@ def _nuisance_text(law, value: float, std: float, span: float) -> str:
     span : largest command
     """
     if law.nuisance and law.only is not None:
-        return f"the drive's offset drifts by {value:.2g} +- {std:.1g} a second in {law.only}"
+        return f"the amplifier offset drifts by {value:.2g} +- {std:.1g} per second in {law.only}"
     if law.kind is DriveOffset:
         if abs(value) < NEGLIGIBLE_OFFSET * span:
             return ""

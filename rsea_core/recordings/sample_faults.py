@@ -8,7 +8,7 @@ from rsea_core.recordings.recording import Recording
 
 STILL_s, STILL_SHARE = 0.3, 0.1  # a reading stands still for so long, and for this share of rows
 JUMP = 30.0  # times the steps that nine of ten rows keep to: no inertia allows it
-ALONE = 4.0  # times the steps before and after: an oscillation that decays has large ones in a row
+ALONE = 4.0  # times the steps of neighbouring rows: an oscillation has many large ones
 FLAT_s = 0.02  # a noisy reading that stays at its extreme for this long is cut off
 OUTER = 0.1  # of the largest reading: a drive that is off reads nothing for long, and is not cut
 AT_ONCE_s = 0.01  # in which no motor or link stops from a good part of its largest speed
@@ -75,9 +75,9 @@ def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
         return [_jump(r, name, float(alone[k - 1]), text, Kind.SPIKE)]
     if not name.endswith("angle_rad"):
         return []
-    sizes = np.pad(np.abs(steps), 1)
-    alone = sizes[1:-1] > ALONE * np.maximum(sizes[:-2], sizes[2:])
-    far = np.flatnonzero((sizes[1:-1] > limit) & alone)
+    sizes = np.abs(steps)
+    near = np.minimum(_largest_at(sizes, (1,)), _largest_at(sizes, (2, 3)))  # of one row, or two
+    far = np.flatnonzero((sizes > limit) & (sizes > ALONE * near))
     if not far.size:
         return []
     k = int(far[0])
@@ -85,6 +85,13 @@ def jumps(r: Recording, name: str, floor: float) -> list[Finding]:
     times = "" if far.size == 1 else f", {far.size} times in all"
     text = f"{name} jumps by {size:.4g} rad at {r.time_s[k + 1]:.6g} s{times}"
     return [_jump(r, name, size, text, Kind.JUMP)]
+
+
+def _largest_at(sizes: NDArray, rows: tuple[int, ...]) -> NDArray:
+    """Largest of the sizes (n,) that many rows before and after each."""
+    padded = np.pad(sizes, max(rows))
+    shifted = [np.roll(padded, k) for row in rows for k in (row, -row)]
+    return np.max(shifted, axis=0)[max(rows) : -max(rows)]
 
 
 def _jump(r: Recording, name: str, size: float, text: str, kind: Kind) -> Finding:

@@ -74,7 +74,7 @@ def axis_recording(
     two_levels : bool
         One size of the command, of both signs, after a second of zero.
     drift_A_per_s : float
-        Of the amplifier's offset, in a second of bench units, in no column of the log.
+        Drift of the amplifier's offset per second of bench units; the log does not show it.
     """
     rng = np.random.default_rng(seed)
     n = 1200

@@ -188,7 +188,7 @@ def piece_of(machine, fx, row, time, command, n, offset, latest):
         acts = goal_of(machine.plant, time, command, max(acting, 0)) + fx[e.COMMAND_OFFSET]
     else:
         given = command[acting] if acting >= 0 else 0.0
-        acts = acting_command(fx, given + fx[e.COMMAND_DRIFT] * time[row.index])
+        acts = acting_command(fx, given + fx[e.COMMAND_DRIFT] * (time[row.index] - time[0]))
     torque, length = 0.0, end - offset
     if machine.plant.drive == mp.MOTOR_TORQUE and row.closed:
         torque = machine.plant.torque_per_motor_torque * acts

@@ -33,14 +33,14 @@ OF_SPRING = {
 }
 OF_TRAIN = {k.effect for k in (GearBacklash, GearTransmissionError)}
 LARGEST = 1.5  # noise floors that the relation leaves, at most
-WHITE = 2.0  # block means over those of white noise; 3.1 and more with a law in 8 machines
+WHITE = 2.0  # block means over those of white noise; 3.1 and more where a law acts (11 cases)
 BLOCKS = 20  # of the longest means
-VISIBLE = 40.0  # noise floors over which a side of the relation must vary
+VISIBLE = 40.0  # noise floors, standard deviation of what a law would act on
 
 
 @dataclass(frozen=True, kw_only=True)
 class AngleRelation:
-    """A relation that the recordings keep, and how far its parts vary.
+    """A relation that the recordings satisfy, and how far its parts vary.
 
     Attributes
     ----------
@@ -63,8 +63,8 @@ class AngleRelation:
     def refutes(self, law: Law) -> bool:
         """Whether the law would add to a side of the relation by more than noise."""
         if law.effect in OF_TRAIN or law.sensor in ANGLES:
-            if law.effect == SensorOffset.effect or "session" in law.law:
-                return False  # the constant, which differs between recordings
+            if law.effect == SensorOffset.effect or law.fixed_numbers.get("session"):
+                return False  # a constant in each recording, or nearly
             if law.effect == SensorScale.effect and not self.elastic:
                 return False  # the ratio's error
             return self.motion > VISIBLE
@@ -76,7 +76,7 @@ class AngleRelation:
 
 
 def angle_relation(case: Case) -> AngleRelation | None:
-    """The relation, if all recordings that are fitted have its readings and keep it."""
+    """The relation, if all recordings that are fitted have its readings and satisfy it."""
     elastic = case.rig.has("spring")
     needed = (*ANGLES, TORQUE) if elastic else ANGLES
     if not case.rig.has("gear") or not case.identification:

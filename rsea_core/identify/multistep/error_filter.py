@@ -88,18 +88,17 @@ class Readings(NamedTuple):
     def with_zeros(self, plant: mp.Plant) -> list[int]:
         """Readings whose zero is a state: those, and others that may err by a count.
 
-        The first reading is the reference for the angle of a rigid body, or for the speed. A free
-        zero of a current or a torque would absorb the offset of a sensor.
+        The first angle or speed is the reference for the angle of a rigid body, or for its speed. A
+        free zero of a current or a torque would absorb the offset of a sensor.
         """
         elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
-        found = []
-        for j, name in enumerate(self.channels):
-            small = name not in ("current_A", "torque_Nm")
-            if j == 0:
-                small = elastic and name.endswith("angle_rad")
-            if small or j in self.zeros:
-                found.append(j)
-        return found
+        moving = [
+            j for j, name in enumerate(self.channels) if name not in ("current_A", "torque_Nm")
+        ]
+        found = set(self.zeros) | set(moving[1:])
+        if moving and elastic and self.channels[moving[0]].endswith("angle_rad"):
+            found.add(moving[0])
+        return sorted(found)
 
 
 class LinearErrors(NamedTuple):

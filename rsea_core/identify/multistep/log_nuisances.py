@@ -23,7 +23,7 @@ from rsea_core.machine.tolerances import TOLERANCES
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.recording import Recording
 
-OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's zero
+OFFSET_PRIOR = 0.03  # of the largest command: an amplifier's offset
 OF_FULL_SCALE = 0.2  # smallest span of commands, for that offset
 DELAY_PRIOR_ROWS = 1.0
 SERVO_DELAY_ROWS = 5.0  # a goal passes a bus and the servo's own cycle
@@ -48,8 +48,7 @@ def nuisances(case: Case) -> tuple[Law, ...]:
         return (*clocks[1:], *lags)
     servo = any(r.command_name == POSITION_COMMAND for r in driven)
     span = max(_span(r) for r in driven)
-    # the offset of an amplifier is one of its range, however small its commands are
-    full = OF_FULL_SCALE * (_full_scale(driven[0].command_name, case.rig) or 0.0)
+    full = _least_span(driven[0], case.rig)
     row = max(r.sample_time_s for r in driven)
     if span == 0.0:
         offsets = (DriveOffset.nuisance(full, OFFSET_PRIOR),) if full else ()
@@ -71,16 +70,20 @@ def nuisances(case: Case) -> tuple[Law, ...]:
 
 
 def offset_drifts(case: Case) -> tuple[Law, ...]:
-    """A drift of the amplifier's zero in each recording that is fitted; none of a servo."""
+    """A drift of the amplifier's offset in each recording that is fitted; none of a servo."""
     driven = [r for r in case.identification if r.command_name in COMMANDS]
-    if any(r.command_name == POSITION_COMMAND for r in driven):
+    if not driven or any(r.command_name == POSITION_COMMAND for r in driven):
         return ()
-    full = OF_FULL_SCALE * (_full_scale(driven[0].command_name, case.rig) or 0.0) if driven else 0.0
-    span = max([full, *map(_span, driven)])
+    span = max(_least_span(driven[0], case.rig), *map(_span, driven))
     return tuple(
         DriveOffset.drift(r.file, span, OFFSET_PRIOR, float(r.time_s[-1] - r.time_s[0]))
         for r in driven if span > 0.0
     )  # fmt: skip
+
+
+def _least_span(r: Recording, rig: Rig) -> float:
+    """An amplifier's offset is one of its range, however small its commands are."""
+    return OF_FULL_SCALE * (_full_scale(r.command_name, rig) or 0.0)
 
 
 def _span(r: Recording) -> float:

@@ -130,7 +130,7 @@ def _laws_added(
             break
         little = len(search.taken) == 1 and search.excess() > MOST_LEFT * found.excess
         if little or (found.unpredicted and search.left() > MUCH_LEFT * left):
-            say("whole recordings: no law predicts them; no further one is added")
+            say("whole recordings: much is left; no further law is added")
             return found, search
         search.prune(say)
         other = with_single_zeros(found, own, search.fit, say)

@@ -1,9 +1,8 @@
-"""A slow drift of the amplifier's zero, which belongs to its recording and to no other.
+"""A slow drift of the amplifier's offset, which belongs to its recording and to no other.
 
-A drift hidden in the constants moves the resistance, the damping and the offset along a valley of
-nearly equal errors, and what it leaves of whole recordings is mistaken for a law. It is a part of
-the hypothesis only where parameters with it leave no more than the sensors' noise: a machine that
-warms drifts too, in proportion to its current. It predicts no other recording.
+Without it the parameters and the offset are biased, and what is left of whole recordings can be
+mistaken for a law. It is part of the hypothesis only where parameters with it leave no more than
+the sensors' noise: heating changes the motor's torque slowly too. It predicts no other recording.
 """
 
 from dataclasses import replace
@@ -21,7 +20,7 @@ ITERATIONS = 12
 
 
 def with_offset_drift(found: Found, say) -> Found:
-    """Parameters alone with drifts of the amplifier's zero, if these leave nothing but noise.
+    """Parameters alone with drifts of the amplifier's offset, if these leave nothing but noise.
 
     The search as it was where laws were found, or where drifts explain less than `DRIFT_SHARE` of
     what parameters alone leave.
@@ -41,7 +40,7 @@ def with_offset_drift(found: Found, say) -> Found:
     left = misfit(own, more, fit.x)
     if left > DRIFT_LEAVES or plain.cost - fit.cost < DRIFT_SHARE * before:
         return found
-    say(f"whole recordings: drifts of the amplifier's zero leave {left:.2f}, without a law")
+    say(f"whole recordings: drifts of the amplifier's offset leave {left:.2f}, without a law")
     own, fit = in_own_share(own, fit)
     return replace(
         found, base_estimator=own, base=fit, estimator=own, best=fit, horizon=None,

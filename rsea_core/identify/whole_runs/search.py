@@ -373,8 +373,8 @@ def plainest(trials: Sequence[Trial], doubt: float) -> Trial:
     """Of laws that gain as much as the best, as far as can be told, the plainest.
 
     Every machine has friction: where it explains as much, no dead zone of the drive is named.
-    Encoders have whole counts, and gears are cut closely: where a spring explains as much, no scale
-    factor of an angle and no transmission error is; where a scale factor does, no such error.
+    Encoders have whole counts, and gears are accurate: where a spring explains as much, neither a
+    scale factor of an angle nor a transmission error is named; a scale factor before such an error.
     Uneven rows of a log leave an error in proportion to the gain, which further values can fit.
     Of equally plain laws one that keeps the machine close to its rig file is taken unless it gains
     far less: two encoders that disagree by a factor do not tell which of them is wrong. What acts

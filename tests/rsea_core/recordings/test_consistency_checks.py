@@ -123,12 +123,14 @@ def test_a_wrong_sign_unit_or_sensor_is_reported_with_its_column(what):
     assert set(found) <= set(data_errors(case))
 
 
-def released(*, step_rad: float = 0.0) -> Recording:
-    """An oscillation of 27 rows a cycle from rest, which soon decays; then a step."""
+def released(*, step_rad: float = 0.0, rows: int = 1) -> Recording:
+    """An oscillation of 27 rows a cycle from rest, which soon decays; a step within some rows."""
     t = ROW_s * np.arange(ROWS)
     count, decay, rate = 1e-4, 12.0, 2.0 * np.pi * 37.0
     cycles = np.cos(rate * t) + decay / rate * np.sin(rate * t)
-    angle = 0.1 * np.exp(-decay * t) * cycles + step_rad * (t > 3.0)
+    angle = 0.1 * np.exp(-decay * t) * cycles + step_rad * np.clip(
+        (t - 3.0) / (rows * ROW_s), 0.0, 1.0
+    )
     return Recording(
         file="a.csv", load=Load(kind="pendulum"), sample_time_s=ROW_s,
         columns={"time_s": t, "duty": 0.0 * t, "load_angle_rad": count * np.round(angle / count)},
@@ -141,9 +143,11 @@ def test_a_fast_oscillation_that_decays_neither_jumps_nor_begins_in_motion():
     assert initial_motion(r, "load_angle_rad", 1e-4 / np.sqrt(12.0)) is None
 
 
-def test_a_step_after_the_oscillation_has_decayed_is_a_jump():
-    (found,) = jumps(released(step_rad=0.02), "load_angle_rad", 1e-4 / np.sqrt(12.0))
-    assert "jumps by 0.02 rad at 3.001 s" in found.text
+@pytest.mark.parametrize("rows", [1, 2])
+def test_a_step_after_the_oscillation_has_decayed_is_a_jump(rows):
+    r = released(step_rad=0.04, rows=rows)
+    (found,) = jumps(r, "load_angle_rad", 1e-4 / np.sqrt(12.0))
+    assert f"jumps by {0.04 / rows:g} rad at 3.001 s" in found.text
 
 
 @pytest.mark.parametrize("factor", [60.0, 10.0])

@@ -1,10 +1,13 @@
 """The filter of a prediction's errors: exact discretisation, white innovations, the true noise."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+import rsea_core.machine.plant as mp
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.error_filter import discretised
+from rsea_core.identify.multistep.error_filter import Readings, discretised
 from rsea_core.identify.multistep.estimator import Estimator, independent_share
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import Filter, filter_gains, innovations, smoothed
@@ -114,3 +117,22 @@ def test_readings_begin_with_an_unknown_zero_except_that_of_a_torque_sensor(tmp_
     (start,) = start_variances(track, track.errors)
     spread = np.var(experiment.measured[:, experiment.channels.index("torque_Nm")])
     assert start[zero["torque_Nm"]] == pytest.approx(spread)
+
+
+@pytest.mark.parametrize(
+    ("channels", "structure", "found"),
+    [
+        (("motor_angle_rad", "load_angle_rad", "current_A"), mp.RIGID_FREE, [1]),
+        (("current_A", "motor_velocity_rad_per_s"), mp.RIGID_FREE, []),
+        (("current_A", "motor_velocity_rad_per_s", "load_velocity_rad_per_s"), mp.RIGID_FREE, [2]),
+        (("motor_angle_rad", "load_angle_rad", "torque_Nm"), mp.ELASTIC_FREE, [0, 1]),
+        (("torque_Nm", "motor_velocity_rad_per_s"), mp.ELASTIC_FREE, []),
+    ],
+)
+def test_the_first_angle_or_speed_is_the_reference_whatever_is_read_before_it(
+    channels, structure, found
+):
+    """A zero of the only speed would absorb an amplifier's offset."""
+    plant = SimpleNamespace(structure=structure)
+    assert Readings(channels).with_zeros(plant) == found
+    assert Readings(channels, zeros=(0,)).with_zeros(plant) == sorted({0, *found})

@@ -1,4 +1,4 @@
-"""A drift of the amplifier's zero: found in its recording, no effect, and part of no model."""
+"""A drift of the amplifier's offset: found in its recording, no effect, and part of no model."""
 
 import numpy as np
 import pytest
@@ -15,8 +15,8 @@ DRIFT_A_per_s = 0.004
 
 
 def test_the_engine_adds_a_drift_to_the_command_of_each_row():
-    time = 0.01 * np.arange(200)
-    current = np.sin(3.0 * time)
+    since = 0.01 * np.arange(200)
+    time, current = 5.0 + since, np.sin(3.0 * since)
     model = ActuatorModel(axis_rig())
 
     def angle(command, drift):
@@ -27,7 +27,7 @@ def test_the_engine_adds_a_drift_to_the_command_of_each_row():
         fx[COMMAND_DRIFT] = drift
         return replay.run(numbers._replace(fx=fx))[:, 0]
 
-    np.testing.assert_allclose(angle(current, 0.3), angle(current + 0.3 * time, 0.0), atol=1e-12)
+    np.testing.assert_allclose(angle(current, 0.3), angle(current + 0.3 * since, 0.0), atol=1e-12)
 
 
 def test_an_offset_that_drifts_is_no_missing_physics(tmp_path):
