@@ -16,10 +16,15 @@ GIVEN := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, 
 	t = np.arange(9) * 1e-3; given = Inputs(time_s=t, duty=0 * t, load=Load(kind='locked')); \
 	model = ActuatorModel(Rig.preset('rsea-bench'))
 
-# tests that compile what a diagnosis needs beside the engines
+# tests that compile what the others need beside the engines: two lists, side by side
 COMPILE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 0
-WINDOWS := tests/rsea_core/identify/multistep/test_diagnosis.py::test_one_recording_of_a_bare_pendulum_shows_its_dry_friction
-FREE_RUNS := tests/rsea_core/effects/test_planted_effects.py::test_a_diagnosis_names_fits_and_writes_it_and_its_file_predicts
+IDENTIFY := tests/rsea_core/identify
+WINDOWS := $(IDENTIFY)/multistep/test_diagnosis.py::test_one_recording_of_a_bare_pendulum_shows_its_dry_friction \
+	$(IDENTIFY)/multistep/test_error_filter.py $(IDENTIFY)/locate/test_unknown_input.py::test_the_likelihood_of_readings_is_that_of_the_dense_gaussian \
+	tests/dftfs/proof/wide/truth/test_kernel.py
+FREE_RUNS := tests/rsea_core/effects/test_planted_effects.py::test_a_diagnosis_names_fits_and_writes_it_and_its_file_predicts \
+	tests/dftfs/fem/test_friction.py::test_sliding_block_needs_mu_times_its_weight_and_turns_the_work_into_heat tests/dftfs/fem/test_plasticity.py \
+	tests/dftfs/analysis/strength/test_friction_loop.py::test_no_friction_no_loop
 
 # what the system lacks: installed by root where there is apt-get (make NO_APT=1 refuses), else named
 INSTALL := install() { \

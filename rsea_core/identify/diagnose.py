@@ -149,11 +149,10 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
     verdicts = tuple(d.document["verdict"] for d in (first, other))
     if verdicts == ("missing-physics", "unexplained"):
         return first  # a law with a name is no worse for a table that predicts better
-    nothing_found = verdicts[1] in ("no-mismatch", "parameters-only")
-    own = np.inf if nothing_found else held_out_error(other, "parameters_only")
     if theirs > NO_PREDICTION:
         return first  # nothing holds the machine where free runs begin: no opinion
-    return other if theirs < BETTER * mine and held_out_error(other) < own else first
+    own = held_out_error(other, "parameters_only")  # the same where it names no law
+    return other if theirs < BETTER * mine and held_out_error(other) <= own else first
 
 
 def _is_doubtful(found: Diagnosis) -> bool:

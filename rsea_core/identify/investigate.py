@@ -26,6 +26,7 @@ from rsea_core.identify.law_search.window_lengths import in_shorter_windows, pre
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_ERROR,
     DOUBTED_SHARE,
+    FIRST_SHARE,
     LEFT_OF_EACH,
     NEEDS_NO_WINDOWS,
     TIMING_SHARE,
@@ -58,7 +59,7 @@ from rsea_core.identify.whole_runs.sensor_noise import (
     refitted_from_rig,
 )
 from rsea_core.identify.whole_runs.unseen import unpredicted_recordings
-from rsea_core.numeric.work_limit import no_work_left
+from rsea_core.numeric.work_limit import no_work_left, share_of_work
 from rsea_core.recordings.case import Case
 
 
@@ -105,18 +106,19 @@ def _searched(
     if quick:
         found = found_sound(begun(case, None, say, quick=True), say)
     else:
-        found, nearly = _whole_recordings(case, say)
-        missed = unpredicted_recordings(found) if found.sound and not found.complete else []
-        other, more = with_shared_recordings(recorded, missed)
-        if more.keys() - shared.keys():  # of those long enough to be shared
-            case, shared = other, more
-            say(f"not predicted, searched again with two thirds of them: {', '.join(missed)}")
+        with share_of_work(FIRST_SHARE):
             found, nearly = _whole_recordings(case, say)
-        wanted = nearly is not None and nearly.explained > NEEDS_NO_WINDOWS
-        if wanted and not no_work_left():
-            found = _with_gear_mesh_in_whole_runs(case, nearly, say)
-        if nearly is None and not found.complete:
-            found = with_offset_drift(found, say)
+            missed = unpredicted_recordings(found) if found.sound and not found.complete else []
+            other, more = with_shared_recordings(recorded, missed)
+            if more.keys() - shared.keys():  # of those long enough to be shared
+                case, shared = other, more
+                say(f"not predicted, searched again with two thirds of them: {', '.join(missed)}")
+                found, nearly = _whole_recordings(case, say)
+            wanted = nearly is not None and nearly.explained > NEEDS_NO_WINDOWS
+            if wanted and not no_work_left():
+                found = _with_gear_mesh_in_whole_runs(case, nearly, say)
+            if nearly is None and not found.complete:
+                found = with_offset_drift(found, say)
     if not (found.complete or found.sound):
         brief = quick or no_work_left()
         add_all(found, laws_of(found), say, quick=brief)

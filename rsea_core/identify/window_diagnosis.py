@@ -32,7 +32,7 @@ QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
-MOST_WORK = 2e8  # simulated rows of a search, after which it begins nothing further
+MOST_WORK = 6e8  # simulated rows of a search, after which it begins nothing further
 CURTAILED = Finding(
     kind=Kind.METHOD,
     text="the search reached its limit of work: further searches, which could find other laws, were"

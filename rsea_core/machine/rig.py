@@ -108,8 +108,11 @@ class Rig:
             value = getattr(self, key)
             if value is not None:
                 object.__setattr__(self, key, _checked_value(key, value))
-        if "gear" in self.parts:
-            self.need('parts with "gear"', "gear_ratio")
+        if "gear" in self.parts and self.gear_ratio is None:
+            raise RigError(
+                f'rig {self.name!r}: parts with "gear" needs gear_ratio in [rig]'
+                " (1 where the motor turns the output directly)"
+            )
         for key, share in self.tolerances:
             _require_quantity(key, "[tolerances]")
             if not number(share, f"[tolerances] {key}", RigError) > 0.0:

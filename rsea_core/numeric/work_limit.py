@@ -34,6 +34,20 @@ def limited_work(most: float) -> Iterator[Work]:
         _current.reset(token)
 
 
+@contextmanager
+def share_of_work(share: float) -> Iterator[None]:
+    """A context in which a share of the limit is the limit, so that the rest is left for others."""
+    work = _current.get()
+    if work is None:
+        yield
+        return
+    most, work.most = work.most, share * work.most
+    try:
+        yield
+    finally:
+        work.most = most
+
+
 def count_work(amount: float) -> None:
     """Add to the work done; nothing outside of a limit."""
     work = _current.get()

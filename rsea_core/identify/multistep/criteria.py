@@ -129,6 +129,7 @@ SHORTLISTED = 0.1  # of the best gain: laws that are tried again where commands 
 LEAST_OF_BEST = 0.25  # of the best gain so far: a fit that cannot gain this is not continued
 COARSE_STEPS = (12.5, 25.0)  # per fastest cycle, of undivided rows: candidates are compared first
 COARSE_SHARE = 0.1  # of the misfit, that these may change
+FIRST_SHARE = 1 / 3  # of the limit of work, for growths and searches of whole recordings
 WHOLE_RIVALS = 4  # of each law, fitted beside the others
 OUTPUT_ERROR = 0.05  # of the estimated unknown torques, in a fit of whole predictions
 NEARLY_ABSENT = (0.2, 0.05, 0.01)  # of the screened size: starts of a law that fitted worse

@@ -136,12 +136,9 @@ class Step(NamedTuple):
 
 def normal(own: Fitted, h: Hypothesis, x: NDArray, level, columns) -> tuple[NDArray, NDArray]:
     """Gauss-Newton matrix (n, n) and gradient (n,) of the cost."""
-    centre, weight = own.problem.prior(h)
+    prior, slope = own.problem.prior_normal(h, x)
     A, g = normal_equations(level, columns)
-    return (
-        np.diag(weight**2) + own.tempering * A,
-        weight**2 * (x - centre) + own.tempering * g,
-    )
+    return prior + own.tempering * A, slope + own.tempering * g
 
 
 def largest_decrease(own: Fitted, h: Hypothesis, x: NDArray, level, columns) -> float:

@@ -50,6 +50,22 @@ def test_free_runs_replace_windows_only_where_they_predict_clearly_better(
     assert diagnose(case) is opinions[taken]
 
 
+def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_stands(
+    tmp_path, monkeypatch
+):
+    """Free runs named laws without a claim, windows none; only windows model a log's errors."""
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    held_out = replace(case.recordings[0], role="validation")
+    case = replace(case, recordings=(*case.recordings, held_out))
+    opinions = {"windows": opinion(0.1, 0.1), "free runs": opinion(0.3, 1.0)}
+    for each in opinions.values():
+        each.document["verdict"] = "unexplained"
+    monkeypatch.setattr(f"{HERE}.is_bench", lambda case: True)
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
+    assert diagnose(case) is opinions["windows"]
+
+
 def test_no_second_opinion_is_asked_where_the_work_was_limited(tmp_path, monkeypatch):
     case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
     held_out = replace(case.recordings[0], role="validation")

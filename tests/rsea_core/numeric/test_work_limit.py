@@ -2,7 +2,12 @@
 
 import pytest
 
-from rsea_core.numeric.work_limit import count_work, limited_work, no_work_left
+from rsea_core.numeric.work_limit import (
+    count_work,
+    limited_work,
+    no_work_left,
+    share_of_work,
+)
 
 
 def test_work_is_counted_within_its_context_and_not_outside():
@@ -31,3 +36,22 @@ def test_an_error_ends_the_limit():
     with pytest.raises(ValueError, match="stop"), limited_work(0.0):
         raise ValueError("stop")
     assert not no_work_left()
+
+
+def test_within_a_share_the_limit_is_that_share_and_the_whole_one_afterwards():
+    with limited_work(9.0):
+        with share_of_work(1 / 3):
+            assert not no_work_left()
+            count_work(4.0)
+            assert no_work_left()
+        assert not no_work_left()
+        count_work(5.0)
+        assert no_work_left()
+
+
+def test_without_a_limit_a_share_of_it_is_none():
+    with share_of_work(0.0):
+        assert not no_work_left()
+    with limited_work(float("inf")), share_of_work(0.5):
+        count_work(1e12)
+        assert not no_work_left()
