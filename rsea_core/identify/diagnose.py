@@ -25,7 +25,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
-from rsea_core.identify.window_diagnosis import CURTAILED, diagnose_windows
+from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.numeric.threads import on_one_blas_thread
 from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind
@@ -107,7 +107,7 @@ def diagnose(
         except np.linalg.LinAlgError as again:
             text = f"{case.name}: no machine of rig.toml can be fitted to these recordings: {again}"
             raise RecordingError(text) from again
-    if quick or not case.validation or not _is_doubtful(found) or CURTAILED in found.findings:
+    if quick or not case.validation or not _is_doubtful(found):
         return found
     say("innovations stay dependent: a second opinion by free runs")
     return _better(found, lambda: diagnose_free_runs(case, thorough=thorough, say=say), say)

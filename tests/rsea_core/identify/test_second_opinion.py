@@ -66,15 +66,18 @@ def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_sta
     assert diagnose(case) is opinions["windows"]
 
 
-def test_no_second_opinion_is_asked_where_the_work_was_limited(tmp_path, monkeypatch):
+def test_a_second_opinion_is_asked_where_the_work_of_the_first_was_limited_too(
+    tmp_path, monkeypatch
+):
+    """EMPS is diagnosed by free runs."""
     case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
     held_out = replace(case.recordings[0], role="validation")
     case = replace(case, recordings=(*case.recordings, held_out))
     first = opinion(0.3, 3.0)
-    first.findings = (CURTAILED,)
+    first.findings, second = (CURTAILED,), opinion(0.1, 3.0)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: first)
-    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinion(0.1, 3.0))
-    assert diagnose(case) is first
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: second)
+    assert diagnose(case) is second
 
 
 def test_free_runs_have_no_opinion_on_laws_found_with_a_gear_mesh(tmp_path, monkeypatch):
