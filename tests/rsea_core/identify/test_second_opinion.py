@@ -6,11 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose, held_out_error
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import CURTAILED
+from rsea_core.recordings.case import read_case
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
+from tests.cases.places import SHARED_DATA
 
 HERE = "rsea_core.identify.diagnose"
 
@@ -69,7 +72,7 @@ def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_sta
 def test_a_second_opinion_is_asked_where_the_work_of_the_first_was_limited_too(
     tmp_path, monkeypatch
 ):
-    """EMPS is diagnosed by free runs."""
+    """As of EMPS, below."""
     case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
     held_out = replace(case.recordings[0], role="validation")
     case = replace(case, recordings=(*case.recordings, held_out))
@@ -148,3 +151,17 @@ def test_a_search_in_windows_that_fails_is_stated_with_what_free_runs_found(tmp_
     assert found.document["findings"] == ["first", WINDOWS_FAILED.sentence()]
     assert found.findings == (WINDOWS_FAILED,)
     assert runs.document["findings"] == ["first"]
+
+
+def test_dry_friction_of_a_ball_screw_is_named_and_predicts_the_record_held_out():
+    """EMPS (Janot, Gautier & Brunot 2019): 25 s in open loop, and nothing pulls the axis back."""
+    folder = SHARED_DATA / "real" / "emps"
+    if not folder.exists():
+        pytest.skip("the recordings are not part of this repository")
+    found = diagnose(read_case(folder))
+    assert found.document["verdict"] == "missing-physics"
+    (effect,) = found.document["effects"]
+    assert effect["name"] == GearFriction.effect
+    level = effect["parameters"]["coulomb_Nm"]
+    assert abs(level["value"] - 20.4) < 2.0 * level["std"]  # 20.4 N: Janot et al.
+    assert held_out_error(found) < 0.1
