@@ -81,7 +81,7 @@ def spread_of(estimator: Estimator, fit: FoundFit) -> Spread:
     """
     level, columns = estimator.jacobian(fit.hypothesis, fit.x, fine=True)
     _, weight = estimator.problem.prior(fit.hypothesis)
-    prior, _ = estimator.problem.prior_normal(fit.hypothesis, fit.x)
+    prior = np.diag(weight**2)
     stretches, recordings = [], []
     for block, e, J in zip(stretches_of(estimator.tracks), level, columns, strict=True):
         parts = (block == b for b in range(block[-1] + 1))

@@ -4,11 +4,10 @@ Never a scale of everything at once: the bridge's supply and the sensors are tru
 tolerances, so that ratios have an anchor. What the owner trusts (`[anchor]`) does not move.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rsea_core.effects.variant import PLANT, TrialMachine
 from rsea_core.machine.inputs import POSITION_COMMAND
@@ -44,8 +43,6 @@ DAMPINGS = (*ONE_BODY[1], "load_viscous_Nms_per_rad")
 LITTLE = 0.02  # damping of a machine whose file names none: this share of what its motion needs
 UNKNOWN_INERTIA = 1.0  # of the logarithm: a rigid train's inertia of which a part is left out
 UNKNOWN = 5.0  # times as much where the file leaves the damping out
-CONSTANTS = ("torque_constant_Nm_per_A", "back_emf_constant_Vs_per_rad")
-CONSTANTS_RATIO = 0.03  # of the logarithm of their ratio: two measurements, losses in the iron
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,23 +130,6 @@ def nominals(case: Case) -> tuple[Nominal, ...]:
             )  # fmt: skip
             break
     return tuple(found)
-
-
-def tied(values: Sequence[Nominal]) -> NDArray:
-    """Rows (m, n) of unknowns that the priors hold near zero, beside each on its own.
-
-    Torque and back-EMF constant are one number in SI units, by the balance of the winding's power:
-    a weaker magnet changes both alike, and units of another convention (line or phase, rms or
-    peak) are in the ratio that the file states. A voltage and a speed determine the back-EMF
-    constant; nothing but this tie then determines the scale of all torques of a machine.
-    """
-    own = {p.key: j for j, p in enumerate(values)}
-    if not all(key in own for key in CONSTANTS):
-        return np.zeros((0, len(values)))
-    row = np.zeros(len(values))
-    for key, sign in zip(CONSTANTS, (1.0, -1.0), strict=True):
-        row[own[key]] = sign * values[own[key]].tolerance / CONSTANTS_RATIO
-    return row[None]
 
 
 def _damping_left_out(rig: Rig, keys: list) -> list[str]:

@@ -17,7 +17,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.errors import InputError, RecordingError, RigError
-from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, tied, write_nominal
+from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, write_nominal
 from rsea_core.identify.fitting.innovations import ReplayTask, replay_innovations
 from rsea_core.identify.fitting.predictions import Windows, predict_readings, run_machines
 from rsea_core.identify.fitting.replay_setup import prepare, start_std
@@ -198,22 +198,6 @@ class Problem:
                         0.0 if parameter.prior is None else parameter.scale / parameter.prior
                     )
         return np.array(centre), np.array(weight)
-
-    def prior_normal(self, hypothesis: Hypothesis, x: NDArray) -> tuple[NDArray, NDArray]:
-        """Matrix (n, n) and gradient (n,) of half the squares of all priors, ties included."""
-        centre, weight = self.prior(hypothesis)
-        A, g, rows = np.diag(weight**2), weight**2 * (x - centre), tied(self.nominals)
-        own = slice(0, rows.shape[1])
-        A[own, own] += rows.T @ rows
-        g[own] += rows.T @ (rows @ x[own])
-        return A, g
-
-    def prior_cost(self, hypothesis: Hypothesis, x: NDArray) -> float:
-        """Half the squares of all priors, ties included."""
-        centre, weight = self.prior(hypothesis)
-        rows = tied(self.nominals)
-        ties = rows @ x[: rows.shape[1]]
-        return 0.5 * float(np.sum((weight * (x - centre)) ** 2) + ties @ ties)
 
     def values(self, hypothesis: Hypothesis, x: NDArray) -> tuple[dict, list[dict]]:
         """Nominal values by key, and each law's values by name."""

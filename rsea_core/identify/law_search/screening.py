@@ -77,10 +77,10 @@ class Projection:
         self.root = np.sqrt(estimator.tempering * huber_weights(e))
         self.J = J * self.root
         self.target = -e * self.root
-        prior, slope = estimator.problem.prior_normal(fit.hypothesis, fit.x)
-        A = self.J @ self.J.T + prior + 1e-9 * np.eye(fit.x.size)
+        centre, weight = estimator.problem.prior(fit.hypothesis)
+        A = self.J @ self.J.T + np.diag(weight**2 + 1e-9)
         self.L = np.linalg.cholesky(A)
-        g = self.J @ self.target - slope
+        g = self.J @ self.target - weight**2 * (fit.x - centre)
         self.left = self.target - self.J.T @ np.linalg.solve(self.L.T, np.linalg.solve(self.L, g))
         self.blocks = _block_of_each(estimator.tracks)
 

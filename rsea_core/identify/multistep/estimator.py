@@ -147,7 +147,8 @@ class Estimator:
         found = self.innovations(trials) if found is None else found
         total = np.zeros(len(trials))
         for j, (h, x) in enumerate(trials):
-            total[j] = self.problem.prior_cost(h, x)
+            centre, weight = self.problem.prior(h)
+            total[j] = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         for t, e in zip(self.tracks, found, strict=True):
             power = huber_squares(e).sum(axis=(1, 2)) + t.log_det
             total += 0.5 * self.tempering * power
@@ -237,7 +238,8 @@ class Estimator:
                 shared = None if little else [J[: len(s)] for J, s in zip(end.columns, shared)]
             x, cost, damping, arrived, _ = end
             taken += 1
-        prior_cost = self.problem.prior_cost(h, x)
+        centre, weight = self.problem.prior(h)
+        prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(
             hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,
             likelihood=float(cost - prior_cost) / self.tempering,

@@ -136,9 +136,12 @@ class Step(NamedTuple):
 
 def normal(own: Fitted, h: Hypothesis, x: NDArray, level, columns) -> tuple[NDArray, NDArray]:
     """Gauss-Newton matrix (n, n) and gradient (n,) of the cost."""
-    prior, slope = own.problem.prior_normal(h, x)
+    centre, weight = own.problem.prior(h)
     A, g = normal_equations(level, columns)
-    return prior + own.tempering * A, slope + own.tempering * g
+    return (
+        np.diag(weight**2) + own.tempering * A,
+        weight**2 * (x - centre) + own.tempering * g,
+    )
 
 
 def largest_decrease(own: Fitted, h: Hypothesis, x: NDArray, level, columns) -> float:

@@ -167,8 +167,8 @@ def predicted_cost(unseen: Estimator, own: Estimator, h: Hypothesis, x: NDArray)
     low, high = own.problem.bounds(h)
     level, columns = own.jacobian(h, x)
     power = max(float(np.mean([np.mean(huber_squares(e)) for e in level])), 1.0)
-    prior, _ = own.problem.prior_normal(h, x)
-    precision = prior + normal_equations(level, columns)[0] / power
+    _, weight = own.problem.prior(h)
+    precision = np.diag(weight**2) + normal_equations(level, columns)[0] / power
     best, cost = x, _cost(unseen, h, x)
     for _ in range(PREDICTION_STEPS):
         A, g = normal_equations(*unseen.jacobian(h, best))

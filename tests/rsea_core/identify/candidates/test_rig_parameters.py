@@ -2,20 +2,9 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
-from rsea_core.identify.candidates.rig_parameters import (
-    CONSTANTS,
-    CONSTANTS_RATIO,
-    Nominal,
-    held_jointly,
-    nominals,
-    tied,
-    unstated_std,
-)
-from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.identify.candidates.rig_parameters import held_jointly, nominals, unstated_std
 from rsea_core.machine.inputs import Load
 from rsea_core.machine.tolerances import TOLERANCES
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
@@ -110,40 +99,3 @@ def tolerance(case, key, **values):
 def test_an_unstated_inertia_of_a_rigid_train_widens_the_prior_of_the_other(case, key, absent):
     assert tolerance(case, key) == TOLERANCES[key]
     assert tolerance(case, key, **{absent: None}) > 1.0
-
-
-def of_constants(by_torque: float, by_speed: float, tolerance: float = 0.08) -> float:
-    """Squares of the ties where torque and back-EMF constant are off by factors."""
-    values = [Nominal(key=key, value=0.1, tolerance=tolerance) for key in (*CONSTANTS, "other")]
-    x = np.log([by_torque, by_speed, 7.0]) / tolerance
-    return float(np.sum((tied(values) @ x) ** 2))
-
-
-def test_a_weaker_magnet_costs_no_tie_and_one_constant_alone_does():
-    assert of_constants(0.8, 0.8) == pytest.approx(0.0, abs=1e-20)
-    assert of_constants(1.1, 1.0) == pytest.approx((np.log(1.1) / CONSTANTS_RATIO) ** 2)
-    assert of_constants(1.1, 1.0, tolerance=0.02) == pytest.approx(of_constants(1.1, 1.0))
-
-
-def test_one_constant_alone_is_tied_to_nothing():
-    assert tied([Nominal(key=CONSTANTS[0], value=0.1, tolerance=0.08)]).shape == (0, 1)
-
-
-def test_gradient_and_matrix_of_the_priors_are_derivatives_of_their_cost(case):
-    rig = replace(
-        axis_rig(), terminal_resistance_ohm=2.0, back_emf_constant_Vs_per_rad=0.5,
-        supply_voltage_V=24.0,
-    )  # fmt: skip
-    r = case.recordings[0]
-    named = {("voltage_V" if "command" in k else k): v for k, v in r.columns.items()}
-    problem = MultistepProblem(replace(case, rig=rig, recordings=(replace(r, columns=named),)))
-    h = Hypothesis()
-    assert set(CONSTANTS) <= set(problem.names(h))
-    x = np.random.default_rng(2).normal(size=len(problem.nominals))
-    A, g = problem.prior_normal(h, x)
-    step = 1e-4 * np.eye(x.size)
-    ahead, behind = (
-        np.array([problem.prior_cost(h, x + sign * row) for row in step]) for sign in (1.0, -1.0)
-    )
-    assert (ahead - behind) / 2e-4 == pytest.approx(g, rel=1e-6)
-    assert problem.prior_normal(h, x + step[0])[1] - g == pytest.approx(1e-4 * A[0], rel=1e-6)
