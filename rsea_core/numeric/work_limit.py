@@ -36,7 +36,7 @@ def limited_work(most: float) -> Iterator[Work]:
 
 @contextmanager
 def share_of_work(share: float) -> Iterator[None]:
-    """A context in which a share of the limit is the limit, so that the rest is left for others."""
+    """A context in which only a share of the limit may be used; the rest is left for later."""
     work = _current.get()
     if work is None:
         yield

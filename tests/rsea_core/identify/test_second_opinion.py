@@ -57,7 +57,7 @@ def test_free_runs_replace_windows_only_where_they_predict_clearly_better(
 def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_stands(
     tmp_path, monkeypatch
 ):
-    """Free runs named laws without a claim, windows none; only windows model a log's errors."""
+    """Free runs claim nothing either, and do not model the errors of a log."""
     case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
     held_out = replace(case.recordings[0], role="validation")
     case = replace(case, recordings=(*case.recordings, held_out))
@@ -73,7 +73,7 @@ def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_sta
 def test_a_second_opinion_is_asked_where_the_work_of_the_first_was_limited_too(
     tmp_path, monkeypatch
 ):
-    """As of EMPS, below."""
+    """EMPS needs it (the last test)."""
     case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
     held_out = replace(case.recordings[0], role="validation")
     case = replace(case, recordings=(*case.recordings, held_out))
@@ -155,9 +155,9 @@ def test_a_search_in_windows_that_fails_is_stated_with_what_free_runs_found(tmp_
 
 
 def test_dry_friction_of_a_ball_screw_is_named_and_predicts_the_record_held_out(monkeypatch):
-    """EMPS (Janot, Gautier & Brunot 2019): 25 s in open loop, and nothing pulls the axis back.
+    """EMPS (Janot, Gautier & Brunot 2019): an axis without a restoring force, simulated for 25 s.
 
-    Free runs find it, whatever work windows were allowed.
+    Free runs find the friction even if the search in windows has little work.
     """
     monkeypatch.setattr(window_diagnosis, "MOST_WORK", 2e7)
     folder = SHARED_DATA / "real" / "emps"

@@ -92,7 +92,7 @@ def test_complete_laws_in_doubt_stand_where_another_growth_finds_none(tmp_path, 
 def test_another_growth_gains_nothing_unless_whole_recordings_are_likelier_with_it(
     tmp_path, monkeypatch
 ):
-    """Among friction alone, which is what is missing and takes less time than all laws."""
+    """Friction, which is missing, is the only law tried: all laws take longer."""
     monkeypatch.setattr(complete, "laws_of", lambda found: [
         law for law in laws_of(found) if law.effect == LoadFriction.effect
     ])  # fmt: skip
