@@ -3,10 +3,10 @@
 Free runs over whole recordings say most where the machine holds them: the bench, with a duty to a
 bridge, every sensor and rows of a millisecond (`is_bench`). Everywhere else laws are judged by
 predictions over windows with estimated starts and an estimated noise (`multistep`). Where that
-leaves dependent innovations - no law fits the machine quite - free runs are a second opinion, and
-the model that predicts the recordings held out better speaks. The bench asks windows so where its
-free runs find no name, names that leave much, or one that an amplifier's offset imitates: free runs
-do not model the errors of a log.
+leaves dependent innovations or finds no name - no law fits the machine quite - free runs are a
+second opinion, and the model that predicts the recordings held out better speaks. The bench asks
+windows so where its free runs find no name, names that leave much, or one that an amplifier's
+offset imitates: free runs do not model the errors of a log.
 """
 
 from collections.abc import Callable
@@ -109,7 +109,7 @@ def diagnose(
             raise RecordingError(text) from again
     if quick or not case.validation or not _is_doubtful(found):
         return found
-    say("innovations stay dependent: a second opinion by free runs")
+    say("innovations stay dependent, or nothing is named: a second opinion by free runs")
     return _better(found, lambda: diagnose_free_runs(case, thorough=thorough, say=say), say)
 
 
@@ -156,7 +156,7 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
 
 
 def _is_doubtful(found: Diagnosis) -> bool:
-    """Whether the laws found leave innovations that depend on each other, and predict less well.
+    """Whether laws leave dependent innovations or have no name, and predict less well.
 
     Complete laws (docs/diagnosis.md 10.4) are in no doubt. Laws found with an elastic gear mesh
     cannot be compared with free runs, which do not model it.
@@ -166,7 +166,8 @@ def _is_doubtful(found: Diagnosis) -> bool:
     if meshed or (search.complete and search.explained > NEEDS_NO_WINDOWS):
         return False
     dependent = found.conclusion.estimator.tempering < DOUBTED_SHARE
-    return dependent and held_out_error(found) > PREDICTED
+    unnamed = found.document["verdict"] == "unexplained"
+    return (dependent or unnamed) and held_out_error(found) > PREDICTED
 
 
 def held_out_error(found: Diagnosis, fit: str = "after") -> float:

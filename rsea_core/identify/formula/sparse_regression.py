@@ -21,7 +21,7 @@ from rsea_core.effects.formula_torque import (
     FormulaTerm,
 )
 from rsea_core.identify.law_search.screening import Projection
-from rsea_core.identify.law_search.shape_search import response
+from rsea_core.identify.law_search.shape_search import responses
 
 STATES = {"G": (k.TW, k.WW), "L": (k.TL, k.WL)}
 SEEN = 0.02  # share of a function's response that the free values must leave
@@ -101,24 +101,25 @@ def blocks_of(projection: Projection, port: str) -> tuple[Blocks, list[int], flo
     tracks = projection.estimator.tracks
     angle, speed = STATES[port]
     usual = float(np.sqrt(np.mean(np.concatenate([t.motion[:, speed] for t in tracks]) ** 2)))
-    columns = [
-        [
-            response(t, port, term.values(t.motion[:, angle], t.motion[:, speed], usual))
-            for t in tracks
-        ]
-        for term in LIBRARY
-    ]
-    return *blocks_of_columns(projection, columns), usual
+    changes = []
+    for t in tracks:
+        theta, omega = t.motion[:, angle], t.motion[:, speed]
+        values = np.array([term.values(theta, omega, usual) for term in LIBRARY])
+        changes.append(responses(t, port, values))
+    return *blocks_of_changes(projection, changes), usual
 
 
-def blocks_of_columns(
-    projection: Projection, columns: Sequence[Sequence[NDArray]]
+def blocks_of_changes(
+    projection: Projection, changes: Sequence[NDArray]
 ) -> tuple[Blocks, list[int]]:
-    """Normal equations of functions by their responses in each track, and those that are seen."""
-    C = np.array([
-        projection.column([e + c for e, c in zip(projection.level, part, strict=True)])
-        for part in columns
-    ])  # fmt: skip
+    """Normal equations of functions, and those that are seen.
+
+    Parameters
+    ----------
+    changes : sequence of (m, blocks, p) arrays
+        Responses to the m functions of each recording.
+    """
+    C = projection.columns(changes)
     B = np.linalg.solve(projection.L, projection.J @ C.T)
     free = C - (projection.J.T @ np.linalg.solve(projection.L.T, B)).T
     whole, left = np.linalg.norm(C, axis=1), np.linalg.norm(free, axis=1)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rsea_core.machine.plant as mp
-from rsea_core.identify.formula.sparse_regression import STATES, blocks_of_columns
+from rsea_core.identify.formula.sparse_regression import STATES, blocks_of_changes
 from rsea_core.identify.law_search.screening import Projection
-from rsea_core.identify.law_search.shape_search import response
+from rsea_core.identify.law_search.shape_search import responses
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.tracks import Track
 
@@ -94,12 +94,11 @@ def varying_inertia(projection: Projection, base: Estimate, port: str) -> Varyin
     plant = tracks[0].plant
     rigid = plant.structure == mp.RIGID_FREE
     moved = plant.load_inertia if port == "L" else plant.inertia + rigid * plant.load_inertia
-    columns = [
-        [response(t, port, torque) for t, torque in zip(tracks, torques, strict=True)]
-        for cycles in CYCLES
-        for torques in zip(*(_torques(t, port, cycles) for t in tracks), strict=True)
-    ]
-    blocks, seen = blocks_of_columns(projection, columns)
+    changes = []
+    for t in tracks:
+        torques = [torque for cycles in CYCLES for torque in _torques(t, port, cycles)]
+        changes.append(responses(t, port, np.array(torques)))
+    blocks, seen = blocks_of_changes(projection, changes)
     found = []
     for place, cycles in enumerate(CYCLES):
         pair = [2 * place, 2 * place + 1]

@@ -3,7 +3,7 @@
 A screening with the engine takes a wave's phase from the simulated angle. Where this errs by a part
 of a cycle - a free axis, many cycles in a turn - almost any number of cycles seems to explain as
 much as the right one, or none does. Here the phase is that of the smoothed readings, and the
-response that of the linear errors' machine (`shape_search.response`): one linear regression for
+response that of the linear errors' machine (`shape_search.responses`): one linear regression for
 each number.
 """
 
@@ -15,7 +15,7 @@ import rsea_core.engines.event_driven.states as k
 from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.variant import Law
 from rsea_core.identify.law_search.screening import Candidate, Projection
-from rsea_core.identify.law_search.shape_search import ports, response
+from rsea_core.identify.law_search.shape_search import ports, responses
 
 AMPLITUDES, CYCLES = ("sin_Nm", "cos_Nm"), "cycles_per_rev"
 
@@ -42,15 +42,11 @@ def _with_cycles(projection: Projection, law: Law, cycles: float) -> Candidate |
     """A law of one wave with a number of cycles in a turn; None where it moves no reading."""
     tracks = projection.estimator.tracks
     scale, ratio = float(tracks[0].scale.torque_Nm[0]), tracks[0].experiment.where.ratio
-    columns = []
-    for wave in (np.sin, np.cos):
-        torques = [-scale * wave(cycles * ratio * t.motion[:, k.TW]) for t in tracks]
-        moved = [
-            e + response(t, "G", torque)
-            for e, t, torque in zip(projection.level, tracks, torques, strict=True)
-        ]
-        columns.append(projection.column(moved))
-    judged = projection.judged(np.array(columns))
+    moved = []
+    for t in tracks:
+        angle = cycles * ratio * t.motion[:, k.TW]
+        moved.append(responses(t, "G", -scale * np.array([np.sin(angle), np.cos(angle)])))
+    judged = projection.judged(projection.columns(moved))
     if judged is None:
         return None
     size, gain, held_out, deviation = judged

@@ -17,7 +17,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.effects.load_disturbance import LONGEST, disturbance
 from rsea_core.identify.fitting.problem import machine_of
 from rsea_core.identify.law_search.screening import Candidate, Projection
-from rsea_core.identify.law_search.shape_search import response
+from rsea_core.identify.law_search.shape_search import responses
 from rsea_core.identify.multistep.criteria import PULSE_GAIN
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.kalman_filter import huber_squares
@@ -58,7 +58,9 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
     width = length / cells
     at = np.minimum(((r.time_s - r.time_s[0]) / width).astype(int), cells - 1)
     torque = float(t.scale.torque_Nm[1])
-    columns = np.array([_column(projection, number, t, torque * (at == j)) for j in range(cells)])
+    changes = [np.zeros((cells, *e.shape)) for e in projection.level]
+    changes[number] = responses(t, "L", torque * (at == np.arange(cells)[:, None]))
+    columns = projection.columns(changes)
     if not np.all(np.isfinite(columns)):
         return None
     B = np.linalg.solve(projection.L, projection.J @ columns.T)
@@ -79,13 +81,6 @@ def _best_pulse(projection: Projection, number: int, t: Track) -> Candidate | No
         law=law, start=law.starts[0], gain=gain, held_out=gain, size=1.0,
         deviation=max(others, default=0.0),
     )  # fmt: skip
-
-
-def _column(projection: Projection, number: int, t: Track, torque: NDArray) -> NDArray:
-    """Weighted change of all innovations by a torque (n,) on the load of one recording."""
-    moved = list(projection.level)
-    moved[number] = moved[number] + response(t, "L", torque)
-    return projection.column(moved)
 
 
 def _best_interval(G: NDArray, h: NDArray, begin: int) -> tuple[int, int, float, float]:

@@ -89,6 +89,11 @@ class Projection:
         e = np.concatenate([each.ravel() for each in innovations])
         return (e * self.root) + self.target
 
+    def columns(self, changes: Sequence[NDArray]) -> NDArray:
+        """Columns (m, n) of changes (m, blocks, p) of each recording's innovations."""
+        both = [(e + c).reshape(len(c), -1) for e, c in zip(self.level, changes, strict=True)]
+        return np.concatenate(both, axis=1) * self.root + self.target
+
     def judged(self, columns: NDArray) -> tuple | None:
         """Size (k,), gain, held-out gain and its deviation of columns (k, n)."""
         if not np.all(np.isfinite(columns)) or not np.any(columns):
@@ -107,12 +112,10 @@ class Projection:
         for i in range(k):
             for j in range(k):
                 xx[:, i, j] = np.bincount(self.blocks, free[i] * free[j], count)
-        falls = np.empty(count)
         total_xx, total_xy = xx.sum(axis=0), xy.sum(axis=0)
         ridge = 1e-9 * np.trace(total_xx) * np.eye(k) + 1e-30 * np.eye(k)
-        for b in range(count):
-            a = np.linalg.solve(total_xx - xx[b] + ridge, total_xy - xy[b])
-            falls[b] = a @ xy[b] - 0.5 * a @ xx[b] @ a
+        a = np.linalg.solve(total_xx - xx + ridge, (total_xy - xy)[:, :, None])[:, :, 0]
+        falls = np.sum(a * xy, axis=1) - 0.5 * np.einsum("bi,bij,bj->b", a, xx, a)
         return size, gain, float(falls.sum()), float(np.std(falls) * np.sqrt(count))
 
 

@@ -85,18 +85,12 @@ def shapes(projection: Projection) -> list[Shape]:
             nodes = np.unique(np.quantile(both, hats))
             if nodes.size < 4:
                 continue
-            columns = []
-            for j in range(nodes.size):
-                height = np.zeros(nodes.size)
-                height[j] = 1.0
-                part = []
-                for t, v in zip(tracks, values, strict=True):
-                    size = scale * np.interp(v, nodes, height)
-                    sign = -np.sign(t.motion[:, SPEED_OF[signal]]) if friction else 1.0
-                    part.append(response(t, port, sign * size))
-                moved = [e + c for e, c in zip(projection.level, part, strict=True)]
-                columns.append(projection.column(moved))
-            judged = projection.judged(np.array(columns))
+            parts = []
+            for t, v in zip(tracks, values, strict=True):
+                sign = -np.sign(t.motion[:, SPEED_OF[signal]]) if friction else 1.0
+                hats = [np.interp(v, nodes, height) for height in np.eye(nodes.size)]
+                parts.append(responses(t, port, scale * sign * np.array(hats)))
+            judged = projection.judged(projection.columns(parts))
             if judged is None:
                 continue
             size, gain, held_out, deviation = judged
@@ -153,17 +147,17 @@ def _signal(t: Track, name: str) -> NDArray:
     }[name]  # fmt: skip
 
 
-def response(t: Track, port: str, signal: NDArray) -> NDArray:
-    """Change (n, p) of the innovations by a signal (n,) at a port."""
+def responses(t: Track, port: str, signals: NDArray) -> NDArray:
+    """Changes (m, blocks, p) of the innovations by signals (m, n) at a port, one at a time."""
     errors, plant = t.errors, t.plant
     states, h = errors.states, t.experiment.recording.sample_time_s * t.block
-    signal = t.averaged(signal[:, None])[:, 0]
+    signals = t.averaged(signals[:, :, None])[:, :, 0]
     d, n = errors.A.shape[1], len(states)
     b = np.zeros(d)
     rigid = plant.structure == mp.RIGID_FREE
     wheel = plant.inertia + (plant.load_inertia if rigid else 0.0)
     if k.WW not in states or (port == "L" and k.WL not in states and not rigid):
-        return np.zeros((t.blocks, len(t.experiment.channels)))
+        return np.zeros((len(signals), t.blocks, len(t.experiment.channels)))
     if port == "V":
         if k.IM in states:
             b[states.index(k.IM)] = 1.0 / plant.inductance
@@ -191,22 +185,29 @@ def response(t: Track, port: str, signal: NDArray) -> NDArray:
     direct = np.zeros(len(t.experiment.channels))
     if port == "S" and "torque_Nm" in t.experiment.channels:
         direct[t.experiment.channels.index("torque_Nm")] = 1.0
-    residual = np.zeros((signal.size, len(t.experiment.channels)))
-    _respond(errors.A, B, errors.mode, errors.C, t.begins, signal, direct, residual)
-    return replace(t, block=1).innovations(residual[None])[0]
+    residuals = np.zeros((*signals.shape, len(t.experiment.channels)))
+    _respond(errors.A, B, errors.mode, errors.C, t.begins, signals, direct, residuals)
+    return replace(t, block=1).innovations(residuals)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _respond(A, B, mode, C, begins, signal, direct, out):
-    n, p = out.shape
+def _respond(A, B, mode, C, begins, signals, direct, out):
+    m, n, p = out.shape
     d = A.shape[1]
-    x = np.zeros(d)
-    for t in range(n):
-        if begins[t]:
-            x[:] = 0.0
-        for i in range(p):
-            s = direct[i] * signal[t]
+    x, after = np.zeros(d), np.zeros(d)
+    for j in range(m):
+        for t in range(n):
+            if begins[t]:
+                x[:] = 0.0
+            for i in range(p):
+                s = direct[i] * signals[j, t]
+                for a in range(d):
+                    s += C[i, a] * x[a]
+                out[j, t, i] = -s
+            now = mode[t]
             for a in range(d):
-                s += C[i, a] * x[a]
-            out[t, i] = -s
-        x = np.ascontiguousarray(A[mode[t]]) @ x + B[mode[t]] * signal[t]
+                s = B[now, a] * signals[j, t]
+                for b in range(d):
+                    s += A[now, a, b] * x[b]
+                after[a] = s
+            x, after = after, x

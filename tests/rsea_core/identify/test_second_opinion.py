@@ -70,6 +70,30 @@ def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_sta
     assert diagnose(case) is opinions["windows"]
 
 
+@pytest.mark.parametrize(
+    ("verdict", "share", "error", "taken"),
+    [
+        ("missing-physics", 0.1, 0.3, "free runs"),
+        ("unexplained", 0.9, 0.3, "free runs"),
+        ("missing-physics", 0.9, 0.3, "windows"),
+        ("unexplained", 0.9, 0.015, "windows"),  # predicted well
+    ],
+)
+def test_a_second_opinion_is_asked_where_innovations_depend_or_nothing_is_named(
+    tmp_path, monkeypatch, verdict, share, error, taken
+):
+    """A servo with a pendulum (Duclusaud et al. 2025) is diagnosed by it in both cases."""
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    held_out = replace(case.recordings[0], role="validation")
+    case = replace(case, recordings=(*case.recordings, held_out))
+    opinions = {"windows": opinion(error, 3.0), "free runs": opinion(0.5 * error, 3.0)}
+    opinions["windows"].document["verdict"] = verdict
+    opinions["windows"].conclusion.estimator.tempering = share
+    monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
+    monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
+    assert diagnose(case) is opinions[taken]
+
+
 def test_a_second_opinion_is_asked_where_the_work_of_the_first_was_limited_too(
     tmp_path, monkeypatch
 ):
