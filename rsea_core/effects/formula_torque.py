@@ -1,7 +1,8 @@
 """A torque that no named law has, as a sum of terms over the states of one body.
 
 Each term is a coefficient times a function of the body's angle times one of its speed. A diagnosis
-finds them by sparse regression (docs/diagnosis.md 10.5); a file of a model holds them by number.
+finds them by sparse regression (docs/diagnosis-search.md 10.5); a file of a model holds them by
+number.
 """
 
 from collections.abc import Mapping, Sequence

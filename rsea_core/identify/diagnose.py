@@ -158,8 +158,8 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
 def _is_doubtful(found: Diagnosis) -> bool:
     """Whether laws leave dependent innovations or have no name, and predict less well.
 
-    Complete laws (docs/diagnosis.md 10.4) are in no doubt. Laws found with an elastic gear mesh
-    cannot be compared with free runs, which do not model it.
+    Complete laws (docs/diagnosis-search.md 10.4) are in no doubt. Laws found with an elastic gear
+    mesh cannot be compared with free runs, which do not model it.
     """
     search = found.conclusion.found
     meshed = any(law.effect == MESH_DAMPER for law in search.best.hypothesis.laws)

@@ -4,7 +4,7 @@ In windows one search follows, and others where its end is in doubt.
 
 Each further search begins elsewhere: with a law whose innovations are more independent, at other
 times of the commands, or with the gear's mesh in place of a rigid train. The one whose model
-predicts for longest stands, of equals the likeliest (docs/diagnosis.md 10.4).
+predicts for longest stands, of equals the likeliest (docs/diagnosis-search.md 10.4).
 """
 
 from collections.abc import Callable

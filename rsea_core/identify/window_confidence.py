@@ -1,4 +1,4 @@
-"""Probability that a law which the multistep search took is there (docs/diagnosis.md 10.6)."""
+"""Probability that a law of the multistep search is there (docs/diagnosis-search.md 10.6)."""
 
 import numpy as np
 

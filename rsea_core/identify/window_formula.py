@@ -1,7 +1,7 @@
 """Formulas of what has no name, fitted in windows and confirmed as named laws are.
 
 An unknown torque is a sum of functions of angle and speed; a drive may be a static function of its
-command (docs/diagnosis.md 10.5).
+command (docs/diagnosis-search.md 10.5).
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Which of the laws that were screened are worth a fit (docs/diagnosis.md 10.4).
+"""Which of the laws that were screened are worth a fit (docs/diagnosis-search.md 10.4).
 
 One screening sees what it can see: innovations forget what a filter with unknown torques absorbs,
 long windows lose the phase, and values that moved to take a law's part hide it. So laws are

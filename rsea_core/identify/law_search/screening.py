@@ -3,7 +3,7 @@
 Each start of each law is predicted once; the change of the innovations is its column. With all
 free values projected out, the fall of the cost at the best size follows without another
 prediction, and the same with any block of rows left out: the gain on rows that the size was not
-fitted to (docs/diagnosis.md 10.4).
+fitted to (docs/diagnosis-search.md 10.4).
 """
 
 from collections.abc import Sequence

@@ -2,7 +2,7 @@
 
 A controller may run on a clock of its own while the logger stamps its rows late or early; then the
 command changes at even times whatever the stamps say, and the readings belong to the stamps or to
-the even times (docs/diagnosis.md 10.2).
+the even times (docs/diagnosis-search.md 10.2).
 """
 
 from collections.abc import Sequence

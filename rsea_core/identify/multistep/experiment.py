@@ -2,7 +2,7 @@
 
 Beside the machine's own values every hypothesis has nuisances of the experiment: the amplifier's
 offset and the command's delay are values of the fit (`log_nuisances.py`), and whether the command
-is held or moves linearly between rows is decided before the search (docs/diagnosis.md 10.2).
+is held or moves linearly between rows is decided before the search (docs/diagnosis-search.md 10.2).
 """
 
 from collections.abc import Mapping, Sequence

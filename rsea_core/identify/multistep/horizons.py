@@ -1,7 +1,7 @@
 """How far a machine is predictable: windows of growing length, with the noise that they show.
 
 A horizon whose error stays near the spread of the readings ends the growth; the longest one that
-is kept is where laws are judged (docs/diagnosis.md 10.3).
+is kept is where laws are judged (docs/diagnosis-search.md 10.3).
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
 """Free values of every hypothesis that belong to the log or the drive and are no physics.
 
 The amplifier's offset, the delay of the command, clocks and filters of sensors, the rounding of the
-stated gear ratio (docs/diagnosis.md 10.2).
+stated gear ratio (docs/diagnosis-search.md 10.2).
 """
 
 from dataclasses import replace

@@ -1,9 +1,9 @@
 """Which timing of the commands a search uses, and mean commands in long recordings.
 
 Held or linear commands, at the stamps of the rows or at even times, are compared by the likelihood
-of the readings (docs/diagnosis.md 10.2). A command that moves linearly from row to row is simulated
-in `FINER` parts of each row, which multiplies the steps: where a cycle of the machine has thousands
-of rows (EMPS: 5900), the mean over each row is accurate enough.
+of the readings (docs/diagnosis-search.md 10.2). A command that moves linearly from row to row is
+simulated in `FINER` parts of each row, which multiplies the steps: where a cycle of the machine has
+thousands of rows (EMPS: 5900), the mean over each row is accurate enough.
 """
 
 from dataclasses import replace

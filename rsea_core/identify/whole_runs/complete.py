@@ -1,4 +1,4 @@
-"""What whole recordings show: complete laws, or one that is nearly all (docs/diagnosis.md 10.4)."""
+"""Complete laws of whole recordings, or one that is nearly all (docs/diagnosis-search.md 10.4)."""
 
 from dataclasses import replace
 from typing import NamedTuple

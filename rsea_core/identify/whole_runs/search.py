@@ -1,7 +1,8 @@
-"""Laws with which whole recordings are predicted to the sensors' noise (docs/diagnosis.md 10.4).
+"""Laws with which whole recordings are predicted to the sensors' noise.
 
 Where parameters alone leave more, laws are added, each the one that lowers the error most, and
-redundant ones removed. Laws that leave nothing but noise stand; others prove nothing.
+redundant ones removed. Laws that leave nothing but noise stand; others prove nothing
+(docs/diagnosis-search.md 10.4).
 """
 
 from collections.abc import Sequence

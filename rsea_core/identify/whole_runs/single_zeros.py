@@ -1,4 +1,4 @@
-"""Readings whose zero differs in one recording (docs/diagnosis.md 10.4).
+"""Readings whose zero differs in one recording (docs/diagnosis-search.md 10.4).
 
 The zero of a sensor can change when its amplifier is restarted or the sensor is mounted again. No
 law of the machine explains that: an offset acts in every recording, and a drift grows. The zero of
