@@ -12,7 +12,7 @@ from rsea_core.effects.curve import EffectCurve
 from rsea_core.effects.figure_text import FigureText
 from rsea_core.effects.hooks import hook, summed
 from rsea_core.effects.slots import slots
-from rsea_core.effects.typical import LEAST_CYCLES, RANGE, TypicalMagnitudes
+from rsea_core.effects.typical import LEAST_CYCLES, TypicalMagnitudes
 from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown, Values
 from rsea_core.machine.rig import Rig
 
@@ -141,7 +141,7 @@ def linear_motor_cogging(typical: TypicalMagnitudes) -> list[Law]:
     Starts are half a wave apart in the travel: a wave that is off by a quarter is still in phase
     with the true one over most of it. Iron-core motors have harmonics: the second law has two.
     """
-    one_wave = 2.0 * np.pi / (RANGE * typical.angle_rad)  # cycles in 2 pi m
+    one_wave = typical.cycle_of_travel  # cycles in 2 pi m
     ripple = 0.05 * typical.motor_torque_Nm
     size = {"low": -20 * ripple, "high": 20 * ripple, "scale": 0.2 * ripple}
     first = [Unknown(name=f"{p}_Nm", unit="Nm", **size) for p in ("sin", "cos")]

@@ -43,7 +43,9 @@ class TypicalMagnitudes:
         Whether starts and bounds follow the machine's own scales throughout, for any machine;
         else some are those of the bench.
     angle_rad, time_s : float
-        Standard deviation of the load's angle, and that over the speed.
+        Standard deviation of the load's angle in the fastest recording, and that over the speed.
+    widest_angle_rad : float or None
+        The same of the recording in which it is largest; None: `angle_rad`.
     begins_deflected : bool
         Whether a recording begins with a deflected spring.
     spans : mapping
@@ -69,6 +71,7 @@ class TypicalMagnitudes:
     relative: bool = False
     angle_rad: float = 0.5
     time_s: float = 0.25
+    widest_angle_rad: float | None = None
     begins_deflected: bool = True
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     row_s: float = 0.0
@@ -113,10 +116,14 @@ class TypicalMagnitudes:
         """An angle of the motor [rad], as `like_speed`."""
         return self.like_angle(bench) * self._gear
 
+    @property
+    def cycle_of_travel(self) -> float:
+        """Cycles in a turn of the output, of which the widest motion passes one."""
+        return 2.0 * np.pi / (RANGE * (self.widest_angle_rad or self.angle_rad))
+
     def motor_passes(self, cycles: float) -> bool:
         """Whether the motor turns far enough to tell cycles (in a turn) from a smooth curve."""
-        travel = RANGE * self.angle_rad * self._ratio
-        return not self.relative or cycles * travel > LEAST_CYCLES * 2.0 * np.pi
+        return not self.relative or cycles * self._ratio > LEAST_CYCLES * self.cycle_of_travel
 
     def rows_show(self, cycles: float) -> bool:
         """Whether one of these cycles (in a turn) lasts two rows at the motor's rms speed."""

@@ -37,7 +37,7 @@ def own_magnitudes(case: Case) -> TypicalMagnitudes:
     motions = [m for r in free for m in (_motion(r, N, rig),) if m is not None]
     angle, speed = max(motions, default=(0.0, 0.0), key=lambda m: m[1])
     longest = max(float(r.time_s[-1] - r.time_s[0]) for r in case.identification)
-    angle = angle or 1e-9
+    angle, widest = angle or 1e-9, max((m[0] for m in motions), default=0.0)
     speed = speed or angle / longest
     time = min(angle / speed, longest)
     drive = max((_drive_torque(case, r) for r in case.identification), default=0.0)
@@ -57,7 +57,7 @@ def own_magnitudes(case: Case) -> TypicalMagnitudes:
     return TypicalMagnitudes(
         torque_Nm=read or load, motor_torque_Nm=drive / N, current_A=drive / N / kt,
         load_torque_Nm=load, deflection_rad=deflection or load / K, stiffness=K,
-        speed_rad_per_s=speed, angle_rad=angle, time_s=time,
+        speed_rad_per_s=speed, angle_rad=angle, time_s=time, widest_angle_rad=widest or None,
         columns=tuple({c for r in case.identification for c in r.responses}),
         loads=tuple({r.load.kind for r in case.identification}),
         rig=rig, commands=frozenset(r.command_name for r in case.identification),

@@ -44,8 +44,20 @@ def test_only_a_linear_motor_without_a_gear_has_a_free_pitch(case):
 def test_starts_are_half_a_wave_apart_in_the_travel(case):
     typical = own_magnitudes(case)
     wave_numbers = np.array([start[2] for start in linear_motor_cogging(typical)[0].starts])
-    travel = 3.0 * typical.angle_rad
+    travel = 3.0 * typical.widest_angle_rad
     assert np.diff(wave_numbers) == pytest.approx(np.pi / travel, rel=1e-9)
+
+
+def test_the_travel_is_that_of_the_widest_recording(case):
+    """Of a stage with moves and a fast multisine, waves were sought that the moves pass 8 times."""
+    (wide,) = case.recordings
+    rows = 10 * np.arange(wide.rows) % wide.rows
+    angle = 0.2 * wide["motor_angle_rad"][rows]
+    fast = replace(wide, file="fast.csv", columns={**wide.columns, "motor_angle_rad": angle})
+    both = own_magnitudes(replace(case, recordings=(wide, fast)))
+    alone = own_magnitudes(case)
+    assert both.angle_rad < 0.3 * alone.angle_rad
+    assert both.cycle_of_travel == alone.cycle_of_travel
 
 
 def test_the_second_wave_has_half_the_pitch_of_the_first(case):

@@ -85,6 +85,20 @@ def test_the_noise_of_a_reading_becomes_what_a_fit_leaves(sprung, completed):
             assert np.all(t.noise.readings > 0.7 * first.noise.readings)
 
 
+def test_differences_of_a_fast_motion_are_no_lower_limit_of_the_noise_left(sprung, completed):
+    """A resonator driven at a quarter of the row rate: 400 times the noise of its counts."""
+    own = in_sensor_noise(sprung.base_estimator)
+    tracks = []
+    for t in own.tracks:
+        floors = {name: 400.0 * floor for name, floor in t.experiment.floors.items()}
+        noise = replace(t.noise, readings=400.0 * t.noise.readings)
+        tracks.append(prepared(replace(t, experiment=replace(t.experiment, floors=floors)),
+                               noise=noise))  # fmt: skip
+    right = in_noise_left_by(own.having(tracks), completed.best)
+    for t, first in zip(right.tracks, own.tracks, strict=True):
+        np.testing.assert_allclose(t.noise.readings, first.noise.readings, rtol=0.3)
+
+
 def test_a_law_of_the_wrong_sign_is_screened_without_gain_where_asked(sound):
     own, laws = sound.base_estimator, laws_of(sound)
     usual = {c.law.key: c.gain for c in screen(own, sound.base, laws)}
