@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 import rsea_core.identify.window_diagnosis as window_diagnosis
+from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.gear_load_friction import GearLoadFriction
 from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose, held_out_error
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import CURTAILED
-from rsea_core.recordings.case import read_case
+from rsea_core.recordings.case import Case, read_case
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 from tests.cases.places import SHARED_DATA
 
@@ -178,16 +180,34 @@ def test_a_search_in_windows_that_fails_is_stated_with_what_free_runs_found(tmp_
     assert runs.document["findings"] == ["first"]
 
 
+def recorded(name: str) -> Case:
+    """A case of real recordings."""
+    folder = SHARED_DATA / "real" / name
+    if not folder.exists():
+        pytest.skip("the recordings are not part of this repository")
+    return read_case(folder)
+
+
+def test_friction_of_a_servo_that_grows_with_its_load_is_named_beside_its_supply(monkeypatch):
+    """Servo and pendulum (Duclusaud et al. 2025), with little work for windows.
+
+    Their better models have friction that depends on the load, too.
+    """
+    monkeypatch.setattr(window_diagnosis, "MOST_WORK", 2e7)
+    found = diagnose(recorded("bam-xl330"))
+    assert found.document["verdict"] == "missing-physics"
+    named = {effect["name"] for effect in found.document["effects"] if effect["confidence"] > 0.5}
+    assert named == {GearLoadFriction.effect, DriveSaturation.effect}
+    assert held_out_error(found) < 0.2
+
+
 def test_dry_friction_of_a_ball_screw_is_named_and_predicts_the_record_held_out(monkeypatch):
     """EMPS (Janot, Gautier & Brunot 2019): an axis without a restoring force, simulated for 25 s.
 
     Free runs find the friction even if the search in windows has little work.
     """
     monkeypatch.setattr(window_diagnosis, "MOST_WORK", 2e7)
-    folder = SHARED_DATA / "real" / "emps"
-    if not folder.exists():
-        pytest.skip("the recordings are not part of this repository")
-    found = diagnose(read_case(folder))
+    found = diagnose(recorded("emps"))
     assert found.document["verdict"] == "missing-physics"
     (effect,) = found.document["effects"]
     assert effect["name"] == GearFriction.effect
