@@ -188,7 +188,7 @@ def recorded(name: str) -> Case:
     return read_case(folder)
 
 
-def test_friction_of_a_servo_that_grows_with_its_load_is_named_with_the_sag_of_its_supply(monkeypatch):
+def test_a_servo_has_friction_that_grows_with_its_load_and_a_weak_supply(monkeypatch):
     """Servo and pendulum (Duclusaud et al. 2025), with little work for windows.
 
     Their better models have friction that depends on the load, too.
