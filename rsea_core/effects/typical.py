@@ -118,7 +118,7 @@ class TypicalMagnitudes:
 
     @property
     def cycle_of_travel(self) -> float:
-        """Cycles in a turn of the output, of which the widest motion passes one."""
+        """Cycles in a turn of the output at which the widest motion is one cycle long."""
         return 2.0 * np.pi / (RANGE * (self.widest_angle_rad or self.angle_rad))
 
     def motor_passes(self, cycles: float) -> bool:

@@ -90,9 +90,10 @@ class Projection:
         return (e * self.root) + self.target
 
     def columns(self, changes: Sequence[NDArray]) -> NDArray:
-        """Columns (m, n) of changes (m, blocks, p) of each recording's innovations."""
-        both = [(e + c).reshape(len(c), -1) for e, c in zip(self.level, changes, strict=True)]
-        return np.concatenate(both, axis=1) * self.root + self.target
+        """Weighted columns (m, n) of changes (m, blocks, p) of each recording's innovations."""
+        found = np.concatenate([c.reshape(len(c), -1) for c in changes], axis=1)
+        found *= self.root
+        return found
 
     def judged(self, columns: NDArray) -> tuple | None:
         """Size (k,), gain, held-out gain and its deviation of columns (k, n)."""

@@ -37,7 +37,7 @@ LARGEST_NOISE = 10.0  # of what fourth differences of a reading show: coloured n
 UNSURE = 10.0  # by so much the smoother's deviations are too small after unknown commands
 STEPS = np.geomspace(0.05, 6.0, 28)  # of a value, in tolerances
 MOVES = np.concatenate([-STEPS[::-1], [0.0], STEPS])
-FASTEST_MOTION = 1e-3  # noise over what differences of a reading show, at least
+LEAST_OF_FLOOR = 1e-3  # noise that is left, of the floor by differences between rows, at least
 CONVERGED = 60  # iterations at most, of the law that is taken: its minimum may be flat
 
 
@@ -142,8 +142,8 @@ def in_noise_left_by(own: Estimator, fit: Estimate, *, apart: bool = False) -> E
     """Another estimator, the noise of each reading as large as the errors that a fit leaves.
 
     Noise that was estimated while a law was missing includes the error that this law explains. It
-    is no less than that of the counts. What differences of a reading show is no lower limit: of a
-    motion with few rows in a cycle they are the motion's.
+    is no less than that of the counts. The differences between rows are no lower limit: where a
+    cycle has few rows they show the motion.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def in_noise_left_by(own: Estimator, fit: Estimate, *, apart: bool = False) -> E
     tracks = []
     for t, size in zip(own.tracks, sizes, strict=True):
         share = size if apart else np.array([largest[name] for name in t.experiment.channels])
-        least = FASTEST_MOTION * t.experiment.floor_of_each / t.block**0.5
+        least = LEAST_OF_FLOOR * t.experiment.floor_of_each / t.block**0.5
         least = np.minimum(np.maximum(_quantisation(t), least), t.noise.readings)
         readings = np.maximum(share * t.noise.readings, least)
         tracks.append(prepared(t, noise=replace(t.noise, readings=readings)))

@@ -86,9 +86,9 @@ def test_the_noise_of_a_reading_becomes_what_a_fit_leaves(sprung, completed):
 
 
 def test_differences_of_a_fast_motion_are_no_lower_limit_of_the_noise_left(sprung, completed):
-    """A resonator driven at a quarter of the row rate: 400 times the noise of its counts.
+    """Of a resonator driven at a quarter of the row rate they are 400 times its counts' noise.
 
-    What is left then includes the start's error, which so large a noise leaves as it is.
+    One estimate does not reach the true noise: laws are searched again up to three times.
     """
     own = in_sensor_noise(sprung.base_estimator)
     tracks = []
