@@ -1,6 +1,7 @@
 """The rules of the house, kept by reading the imports of every module."""
 
 import ast
+import functools
 import subprocess
 import sys
 from pathlib import Path
@@ -28,13 +29,16 @@ def imports_of(path: Path) -> set[str]:
     return found
 
 
-IMPORTS = {name_of(path): imports_of(path) for path in MODULES}
+@functools.cache
+def imports() -> dict[str, set[str]]:
+    """What each module imports; not read while tests are collected, which every process does."""
+    return {name_of(path): imports_of(path) for path in MODULES}
 
 
 def importers_of(*targets: str) -> set[str]:
     return {
         module
-        for module, imported in IMPORTS.items()
+        for module, imported in imports().items()
         if any(name == t or name.startswith(t + ".") for name in imported for t in targets)
     }
 
@@ -48,7 +52,7 @@ def test_there_are_modules_to_check():
         "dftfs.cli.main",
         "dftfs.fem.newton",
         "rsea_core.engines.event_driven.equations",
-    } <= IMPORTS.keys()
+    } <= imports().keys()
 
 
 def test_core_never_imports_dftfs():
@@ -57,7 +61,7 @@ def test_core_never_imports_dftfs():
 
 def test_fem_knows_no_springs():
     allowed = ("dftfs.fem", "dftfs.errors")
-    for module, imported in IMPORTS.items():
+    for module, imported in imports().items():
         if inside(module, "dftfs.fem"):
             foreign = {i for i in imported if inside(i, "dftfs") and not inside(i, *allowed)}
             assert not foreign - {"dftfs"}, module
@@ -98,7 +102,7 @@ def test_core_is_reached_only_through_the_bridge_and_the_cli():
     }
     reached = {
         module: {i for i in imported if inside(i, "rsea_core")} - readers
-        for module, imported in IMPORTS.items()
+        for module, imported in imports().items()
     }  # the readers of TOML and text know no physics and serve both packages
     outside = {
         m
@@ -152,7 +156,7 @@ IS_PACKAGE = {name_of(path) for path in MODULES if path.stem == "__init__"}
 
 def folder_of(name: str, top: str) -> str | None:
     """The folder below `top` that a module (or a name in it) stands in."""
-    while name not in IMPORTS:
+    while name not in imports():
         name = name.rpartition(".")[0]
     if name in ("", top) or not inside(name, top):
         return None
@@ -164,7 +168,7 @@ def folder_of(name: str, top: str) -> str | None:
 
 def upward_imports(top: str, rank: dict[str, int]) -> list[str]:
     found = []
-    for module, imported in IMPORTS.items():
+    for module, imported in imports().items():
         own = folder_of(module, top) if inside(module, top) and module != top else None
         for name in imported if own is not None else ():
             other = folder_of(name, top) if inside(name, top) else None
@@ -176,7 +180,7 @@ def upward_imports(top: str, rank: dict[str, int]) -> list[str]:
 
 
 def test_every_folder_of_the_core_has_a_layer():
-    folders = {folder_of(m, "rsea_core") for m in IMPORTS if inside(m, "rsea_core")}
+    folders = {folder_of(m, "rsea_core") for m in imports() if inside(m, "rsea_core")}
     assert folders - {None} == RANK.keys()
 
 
@@ -188,14 +192,14 @@ def test_core_folders_import_downwards_only():
 
 def test_analysis_folders_import_downwards_only():
     top = "dftfs.analysis"
-    folders = {folder_of(m, top) for m in IMPORTS if inside(m, top)}
+    folders = {folder_of(m, top) for m in imports() if inside(m, top)}
     assert folders - {None} == ANALYSIS_RANK.keys()
     assert not upward_imports(top, ANALYSIS_RANK)
 
 
 def test_effects_know_the_machine_and_each_other_only():
     allowed = ("rsea_core.effects", "rsea_core.machine", "rsea_core.numeric", "rsea_core.errors")
-    for module, imported in IMPORTS.items():
+    for module, imported in imports().items():
         if inside(module, "rsea_core.effects"):
             foreign = {i for i in imported if inside(i, "rsea_core") and not inside(i, *allowed)}
             assert not foreign, module
@@ -217,8 +221,8 @@ def test_folders_hold_about_a_dozen_modules():
 
 def test_no_import_cycles():
     graph = {
-        module: {i for i in imported if i in IMPORTS and i != module}
-        for module, imported in IMPORTS.items()
+        module: {i for i in imported if i in imports() and i != module}
+        for module, imported in imports().items()
     }
     done: set[str] = set()
 
@@ -238,7 +242,7 @@ def test_commands_are_thin():
     for path in (ROOT / "dftfs" / "cli").glob("*.py"):
         lines = len(path.read_text(encoding="utf-8").splitlines())
         assert lines < 130, f"{path.name} has {lines} lines"
-        imported = IMPORTS[name_of(path)]
+        imported = imports()[name_of(path)]
         assert not {i for i in imported if i.split(".")[0] in ("numpy", "scipy", "numba")}, (
             path.name
         )

@@ -11,6 +11,10 @@ def functions_of(file: str) -> set[str]:
     return {n.name for n in body if isinstance(n, ast.FunctionDef) and n.name.startswith("test_")}
 
 
+def folder_of(test: str) -> str:
+    return test.partition("::")[0].rpartition("/")[0]
+
+
 FILES = {path.relative_to(ROOT).as_posix() for path in ROOT.glob("tests/**/test_*.py")}
 TESTS = {f"{file}::{name}" for file in FILES for name in functions_of(file)}
 
@@ -21,18 +25,17 @@ def test_slow_tests_are_there():
     assert not set(listed) - TESTS - FILES
 
 
-def test_long_tests_are_there_and_each_has_shorter_ones_in_its_file():
+def test_long_tests_are_there_and_each_has_shorter_ones_in_its_folder():
     listed = long_tests()
     assert len(listed) == len(set(listed))
     functions = {test.partition("[")[0] for test in listed}
     assert not functions - TESTS
     whole = {test for test in listed if "[" not in test}
-    files = {test.partition("::")[0] for test in functions}
-    assert all({t for t in TESTS - whole if t.startswith(f"{file}::")} for file in files)
+    shorter = {folder_of(test) for test in TESTS - whole}
+    assert {folder_of(test) for test in functions} <= shorter
 
 
 def test_every_folder_of_tests_has_fast_ones():
     slow = set(slow_tests())
     fast = {test for test in TESTS if slow.isdisjoint((test, test.partition("::")[0]))}
-    folders = [{t.partition("::")[0].rpartition("/")[0] for t in some} for some in (TESTS, fast)]
-    assert folders[0] == folders[1]
+    assert {folder_of(test) for test in TESTS} == {folder_of(test) for test in fast}

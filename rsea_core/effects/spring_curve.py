@@ -5,7 +5,6 @@ from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator
 
 from rsea_core.effects.base import Port, Term, parameter
 from rsea_core.errors import TermError
@@ -182,6 +181,8 @@ def _monotone_tangents(deflection: NDArray, torque: NDArray) -> NDArray:
     secant = np.diff(torque) / np.diff(deflection)
     if secant.size == 1:
         return read_only(np.repeat(secant, 2))
+    from scipy.interpolate import PchipInterpolator  # takes a third of a second to import
+
     tangent = PchipInterpolator(deflection, torque).derivative()(deflection)
     for end in (0, -1):
         if not tangent[end] > 0.01 * secant[end]:

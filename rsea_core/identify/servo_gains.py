@@ -15,7 +15,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
 
 from rsea_core.errors import RecordingError
 from rsea_core.machine.inputs import POSITION_COMMAND
@@ -108,6 +107,8 @@ def _best_follower(rig: Rig, driven: Sequence[Recording], inertia: float) -> tup
 
 def _left(goal: NDArray, angle: NDArray, dt: float, omega: float, zeta: float) -> NDArray:
     """Mean squares of the angle, over its own, that a follower leaves at each of `DELAYS`."""
+    from scipy.signal import cont2discrete, lfilter  # takes a second to import, rarely needed
+
     A = np.array([[0.0, 1.0], [-(omega**2), -2.0 * zeta * omega]])
     system = A, np.array([[0.0], [omega**2]]), np.array([[1.0, 0.0]]), np.zeros((1, 1))
     step, drive, *_ = cont2discrete(system, dt)

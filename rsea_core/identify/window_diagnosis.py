@@ -32,7 +32,9 @@ QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
-MOST_WORK = 6e8  # simulated rows of a search, after which it begins nothing further
+# of a search, after which it begins nothing further: in rows with one step of the engine each
+MOST_WORK = 6e8
+QUICK_WORK = 2e7  # of a quick look, after which it also ends what has a first result
 CURTAILED = Finding(
     kind=Kind.METHOD,
     text="the search reached its limit of work: further searches, which could find other laws, were"
@@ -66,9 +68,10 @@ def diagnose_windows(
     if quick:
         most = max(BRIEF_ROWS, BRIEF_ROWS_OF_EACH * len(case.identification))
         case, cut = truncate(case, np.inf, most, reason="without --quick all rows are")
-    with limited_work(np.inf if thorough else MOST_WORK) as work:
+    most_work = np.inf if thorough else QUICK_WORK if quick else MOST_WORK
+    with limited_work(most_work, strict=quick) as work:
         found = investigate(case, quick=quick, say=say)
-    say(f"work: {work.done:.3g} simulated rows")
+    say(f"work: {work.done:.3g} rows with one step of the engine each")
     conclusion = WindowVerdict(found, case, say)
     brief = QUICK_LOOK if quick else CURTAILED if work.curtailed else None
     findings = [*cut, *([brief] if brief else [])] + [

@@ -40,7 +40,7 @@ def _region(regions, deflection):
     return low
 
 
-@njit(error_model="numpy", inline="always")
+@njit(error_model="numpy", inline="always", cache=True)
 def table_torque(regions, deflection):
     """Torque [Nm] at a deflection [rad]; compiled code."""
     j = _region(regions, deflection)
@@ -48,7 +48,7 @@ def table_torque(regions, deflection):
     return regions[j, C0] + s * (regions[j, C1] + s * (regions[j, C2] + s * regions[j, C3]))
 
 
-@njit(error_model="numpy")
+@njit(error_model="numpy", cache=True)
 def table_tangent(regions, deflection):
     """Tangent stiffness [Nm/rad] at a deflection [rad]; compiled code."""
     j = _region(regions, deflection)

@@ -13,9 +13,13 @@ from dataclasses import dataclass
 
 @dataclass
 class Work:
-    """Work done, its limit, and whether something was left out because of it."""
+    """Work done, its limit, and whether something was left out because of it.
+
+    A strict limit ends what has begun as well, as soon as it has one result.
+    """
 
     most: float
+    strict: bool = False
     done: float = 0.0
     curtailed: bool = False
 
@@ -24,9 +28,9 @@ _current: ContextVar[Work | None] = ContextVar("work", default=None)
 
 
 @contextmanager
-def limited_work(most: float) -> Iterator[Work]:
+def limited_work(most: float, *, strict: bool = False) -> Iterator[Work]:
     """A context in which work is counted and limited; with inf it is only counted."""
-    work = Work(most)
+    work = Work(most, strict)
     token = _current.set(work)
     try:
         yield work
@@ -55,10 +59,16 @@ def count_work(amount: float) -> None:
         work.done += amount
 
 
-def no_work_left() -> bool:
-    """Whether the limit is reached: whoever asks leaves something out then."""
+def no_work_left(*, begun: bool = False) -> bool:
+    """Whether the limit is reached: whoever asks leaves something out then.
+
+    Parameters
+    ----------
+    begun : bool
+        Asked while a search goes on that has a first result: only a strict limit ends it.
+    """
     work = _current.get()
-    if work is None or work.done < work.most:
+    if work is None or work.done < work.most or (begun and not work.strict):
         return False
     work.curtailed = True
     return True

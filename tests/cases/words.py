@@ -86,6 +86,7 @@ AVOIDED_IN_NAMES = {
 
 
 @functools.cache
+@functools.cache
 def words_of(name: str) -> str:
     """The words of a name in lower case: `toTheLeft_K` is "to the left k"."""
     return " ".join(re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+", name)).lower()

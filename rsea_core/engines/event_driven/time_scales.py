@@ -49,7 +49,7 @@ def rates_per_s(
         rates.append(2.0 * gear_ratio * wheel_speed)
     if fx[e.WORM_ERROR_3] != 0.0:
         rates.append(3.0 * gear_ratio * wheel_speed)
-    parallel = e.largest_parallel_stiffness(fx)
+    parallel = e.largest_parallel_stiffness.py_func(fx)
     if parallel > 0.0 and load_inertia > 0.0:
         rates.append(np.sqrt(parallel / load_inertia))
     if fx[e.UNBALANCE] > 0.0 and load_inertia > 0.0:

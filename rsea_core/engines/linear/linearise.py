@@ -154,7 +154,7 @@ def fastest_mode_per_s(plant: mp.Plant, spring: SpringTable) -> float:
 
 def fastest_per_s(plant: mp.Plant, spring: SpringTable, fx: NDArray) -> float:
     """The fastest of the linear modes and of the terms' own nonlinearities [1/s]."""
-    plant = plant._replace(load_inertia=plant.load_inertia * e.least_inertia_factor(fx))
+    plant = plant._replace(load_inertia=plant.load_inertia * e.least_inertia_factor.py_func(fx))
     no_load = plant.volts_per_command / plant.volts_per_speed if plant.volts_per_speed > 0 else 0.0
     of_terms = rates_per_s(
         fx,

@@ -208,7 +208,7 @@ def _window(recording: Recording) -> int:
 
 def _smoothed(values: NDArray, window: int, **more: float) -> NDArray:
     """Savitzky and Golay's cubics over a window of rows; derivatives with `deriv`, `delta`."""
-    from scipy.signal import savgol_filter  # takes a third of a second to import, rarely needed
+    from scipy.signal import savgol_filter  # takes a second to import, rarely needed
 
     return savgol_filter(values, window, 3, **more)
 

@@ -24,6 +24,7 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
 from rsea_core.identify.multistep.horizons import with_noise
+from rsea_core.numeric.work_limit import no_work_left
 
 TRANSMISSION, OFFSET = GearTransmissionError.effect, SensorOffset.effect
 
@@ -33,7 +34,7 @@ def with_richer_law(entry, base: Estimate, laws: Sequence[Law], say):
     c, own, fit = entry
     tried: set[str] = set()
     names = list(c.law.richer)
-    while names:
+    while names and not no_work_left(begun=True):
         name = names.pop(0)
         law = next((w for w in laws if w.law == name and w.effect == c.law.effect
                     and w.sensor == c.law.sensor), None)  # fmt: skip

@@ -159,7 +159,7 @@ def add_all(
 
 def _add_laws(found: Found, laws: Sequence[Law], say, *, quick: bool) -> None:
     """Add law after law, with longer windows as far as they allow."""
-    while len(found.steps) < LAWS:
+    while len(found.steps) < LAWS and not no_work_left(begun=True):
         step = _next_law(found, laws, say, quick=quick)
         if step is None:
             break
@@ -329,7 +329,7 @@ def _finished(
     chosen = rough[:most] + [pair for pair in rough[most:] if pair[0].law.key in choice.apart]
     finished, beyond, without, best = [], [], [], 0.0
     for place, (c, fit) in enumerate(chosen):
-        if place >= FEWER_FINISHED and no_work_left():
+        if place > 0 and no_work_left(begun=place < FEWER_FINISHED):
             break
         enough = np.inf if quick or place >= SECOND_STARTS else WEAK * best
         entry, bound = _end(estimator, base, c, fit, say, enough=enough)

@@ -130,7 +130,7 @@ def _unrepeated_volts(rig: Rig, recorded: Recorded) -> NDArray:
     rms = plant.volts_per_speed * moved / plant.gear_ratio / UNREPEATED_s
     decay = np.exp(-recorded.row_s / UNREPEATED_s)
     noise = np.random.default_rng(n).standard_normal(n) * np.sqrt(1.0 - decay**2)
-    from scipy.signal import lfilter  # takes a third of a second to import, rarely needed
+    from scipy.signal import lfilter  # takes a second to import, rarely needed
 
     return rms * lfilter([1.0], [1.0, -decay], noise)
 

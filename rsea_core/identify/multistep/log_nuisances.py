@@ -10,7 +10,6 @@ from decimal import Decimal
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
@@ -128,6 +127,8 @@ def _lags(case: Case) -> tuple[Law, ...]:
 
 def _filtered(v, signal: NDArray, w: RunConditions) -> NDArray:
     """A signal behind a filter of first order, settled at its first row."""
+    from scipy.signal import lfilter  # takes a second to import, rarely needed
+
     share = 1.0 - np.exp(-float(np.mean(np.diff(w.time_s))) / v["time_s"])
     start = [(1.0 - share) * signal[0]]
     return lfilter([share], [1.0, share - 1.0], signal, zi=start)[0]

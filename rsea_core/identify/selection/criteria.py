@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Bench, Problem
@@ -244,7 +244,7 @@ def far_from_prior(problem: Problem, fit: Fit) -> NDArray:
     n = len(problem.nominals)
     centre, weight = problem.prior(fit.hypothesis)
     pulls = np.abs(weight * (fit.x - centre))[:n]
-    bar = norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(n, 1))))
+    bar = -ndtri(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(n, 1))))
     return (pulls > 1.0) & bool(np.any(pulls > bar))
 
 

@@ -3,8 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from scipy.io import loadmat
-from scipy.io.matlab import MatlabOpaque, MatReadError
 
 from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers.hdf5 import LABELS, ONLY_MATLAB, is_hdf5, read_hdf5
@@ -27,6 +25,9 @@ def read_matlab(path: Path) -> Log:
     RecordingError
         If the file is damaged or has no arrays of three rows.
     """
+    from scipy.io import loadmat  # takes a third of a second to import, rarely needed
+    from scipy.io.matlab import MatlabOpaque, MatReadError
+
     if is_hdf5(path):
         return read_hdf5(path, "MATLAB 7.3", turned=True)
     if path.stat().st_size < SMALLEST_BYTES:  # scipy does not come to an end on a stump of a header

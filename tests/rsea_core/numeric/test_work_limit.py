@@ -55,3 +55,13 @@ def test_without_a_limit_a_share_of_it_is_none():
     with limited_work(float("inf")), share_of_work(0.5):
         count_work(1e12)
         assert not no_work_left()
+
+
+@pytest.mark.parametrize("strict", [False, True])
+def test_only_a_strict_limit_ends_what_has_begun(strict):
+    with limited_work(1.0, strict=strict) as work:
+        assert not no_work_left(begun=True)
+        count_work(1.0)
+        assert no_work_left(begun=True) is strict
+        assert work.curtailed is strict
+        assert no_work_left()
