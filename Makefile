@@ -17,7 +17,7 @@ GIVEN := import numpy as np; from rsea_core import ActuatorModel, Inputs, Load, 
 	model = ActuatorModel(Rig.preset('rsea-bench'))
 
 # tests that compile what the others need beside the engines: two lists, side by side
-COMPILE := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 0
+COMPILE := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -q -n 0
 IDENTIFY := tests/rsea_core/identify
 WINDOWS := $(IDENTIFY)/multistep/test_diagnosis.py::test_one_recording_of_a_bare_pendulum_shows_its_dry_friction \
 	$(IDENTIFY)/multistep/test_error_filter.py $(IDENTIFY)/locate/test_unknown_input.py::test_the_likelihood_of_readings_is_that_of_the_dense_gaussian \
@@ -66,8 +66,9 @@ lint: $(VENV)/.test
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check .
 
 # a worker that crashes ends the run; one that is lost without a word is tests/worker_watch.py's
-# (one thread of BLAS each: two processes with two threads each wait for one another)
-TESTS := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --max-worker-restart=0
+# (one thread of BLAS each: two processes with two threads each wait for one another;
+# modules are kept compiled, for the second process, for commands in tests and the next run)
+TESTS := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder --max-worker-restart=0
 
 test: lint
 	@echo "[test] running the tests on $(JOBS) processes"

@@ -95,7 +95,8 @@ def _asked_for(items: list[pytest.Item], config: pytest.Config) -> list[pytest.I
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     asked_for = _asked_for(items, config)
-    config.hook.pytest_deselected(items=[i for i in items if i not in set(asked_for)])
+    chosen = set(asked_for)
+    config.hook.pytest_deselected(items=[item for item in items if item not in chosen])
     # the longest files first: at the end both processes then have short ones left
     seconds = _seconds_of_files()
     asked_for.sort(key=lambda item: -seconds[item.nodeid.partition("::")[0]])

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cases.places import ROOT
-from tests.cases.sources import LIMITS, MODULES, exceptions, measured, offenders
+from tests.cases.sources import LIMITS, MODULES, every_statement, exceptions, measured, offenders
 
 
 def name_of(path: Path) -> str:
@@ -20,7 +20,7 @@ def name_of(path: Path) -> str:
 def imports_of(path: Path) -> set[str]:
     """Every module that a file imports, wherever in the file the import stands."""
     found: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in every_statement(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):

@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from tests.cases.words import AVOIDED, AVOIDED_IN_NAMES, avoided_in, contents, named_with
+from tests.cases.words import AVOIDED, AVOIDED_IN_NAMES, avoided_in, named_with, with_any_avoided
 
 # word (as in AVOIDED), files, what may stand there, reason
 ALLOWED = (
@@ -71,7 +71,7 @@ def allowed(word: str, place: str, found: str) -> bool:
 def test_no_word_of_the_left_column_is_used(word):
     used = [
         f"{place}: {found}"
-        for place, (names, texts) in contents().items()
+        for place, (names, texts) in with_any_avoided().items()
         for found in avoided_in(names, texts, word)
         if not allowed(word, place, found)
     ]
@@ -83,7 +83,7 @@ def test_every_exception_is_needed():
         assert reason
         assert any(
             re.fullmatch(files, place) and re.search(what, found)
-            for place, (names, texts) in contents().items()
+            for place, (names, texts) in with_any_avoided().items()
             for found in avoided_in(names, texts, word)
         ), (word, files)
 

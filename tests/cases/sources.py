@@ -16,9 +16,25 @@ COMPILERS = ("njit", "jit", "vectorize", "guvectorize", "cfunc", "hook")
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 
+def statements(node: ast.AST) -> Iterator[ast.stmt]:
+    """The statements directly below a node: a class, a function, a loop, a case of a match."""
+    for name in ("body", "orelse", "finalbody"):
+        inside = getattr(node, name, [])
+        yield from inside if isinstance(inside, list) else []
+    for part in (*getattr(node, "handlers", ()), *getattr(node, "cases", ())):
+        yield from part.body
+
+
+def every_statement(node: ast.AST) -> Iterator[ast.stmt]:
+    """The statements at any depth below a node."""
+    for child in statements(node):
+        yield child
+        yield from every_statement(child)
+
+
 def definitions(node: ast.AST, within: str) -> Iterator[tuple[str, ast.AST]]:
     """Every class and function below a node with its qualified name."""
-    for child in ast.iter_child_nodes(node):
+    for child in statements(node):
         if isinstance(child, ast.ClassDef | Function):
             name = f"{within}.{child.name}" if within else child.name
             yield name, child

@@ -127,9 +127,25 @@ def contents() -> dict[str, tuple[frozenset[str], tuple[tuple[int, str], ...]]]:
     return found
 
 
+def _pattern(word: str) -> re.Pattern:
+    return re.compile(rf"(?i)\b(?:{word})\b".replace(" ", r"[\s_]+"))
+
+
+@functools.cache
+def with_any_avoided() -> dict[str, tuple[frozenset[str], tuple[tuple[int, str], ...]]]:
+    """`contents` of the files in which any word of `AVOIDED` stands."""
+    anything = _pattern("|".join(AVOIDED))
+    return {
+        place: (names, texts)
+        for place, (names, texts) in contents().items()
+        if any(anything.search(text) for _, text in texts)
+        or any(anything.search(words_of(name)) for name in names)
+    }
+
+
 def avoided_in(names: frozenset[str], texts, word: str) -> list[str]:
     """The names with a word, and the pieces of text (`line: ... word ...`)."""
-    pattern = re.compile(rf"(?i)\b(?:{word})\b".replace(" ", r"[\s_]+"))
+    pattern = _pattern(word)
     found = [name for name in sorted(names) if pattern.search(words_of(name))]
     for line, text in texts:
         for hit in pattern.finditer(text):
