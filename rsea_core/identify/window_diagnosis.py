@@ -32,8 +32,7 @@ QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
-# of a search, after which it begins nothing further: in rows with one step of the engine each
-MOST_WORK = 6e8
+MOST_WORK = 6e8  # simulated rows of a search, after which it begins nothing further
 QUICK_WORK = 2e7  # of a quick look, after which it also ends what has a first result
 CURTAILED = Finding(
     kind=Kind.METHOD,
@@ -71,7 +70,7 @@ def diagnose_windows(
     most_work = np.inf if thorough else QUICK_WORK if quick else MOST_WORK
     with limited_work(most_work, strict=quick) as work:
         found = investigate(case, quick=quick, say=say)
-    say(f"work: {work.done:.3g} rows with one step of the engine each")
+    say(f"work: {work.done:.3g} simulated rows")
     conclusion = WindowVerdict(found, case, say)
     brief = QUICK_LOOK if quick else CURTAILED if work.curtailed else None
     findings = [*cut, *([brief] if brief else [])] + [

@@ -1,7 +1,6 @@
 """Models as the fixed-step engine reads them: numbers, packed for many models, and their steps."""
 
 from collections.abc import Sequence
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -113,14 +112,6 @@ class Grid:
             springs = np.split(models.springs, models.ends[:-1])
             longest = min(map(longest_step_s, models.plants, springs, models.fx))
             longest = DEFAULT_STEP_s * 2.0 ** np.floor(np.log2(longest / DEFAULT_STEP_s))
-        return self._of_length(longest)
-
-    @cached_property
-    def total(self) -> int:
-        """Steps of a run over all rows, in steps of the length given."""
-        return int(self._of_length(self._step_s or DEFAULT_STEP_s).sum())
-
-    def _of_length(self, longest: float) -> NDArray:
         if longest not in self._known:
             steps = np.maximum(np.ceil(self._rows_s / longest - 1e-9), 1.0)
             if not steps.sum() <= MAX_STEPS:

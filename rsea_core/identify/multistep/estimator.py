@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.multistep.experiment import Experiment, MultistepProblem
+from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.kalman_filter import HUBER, huber_squares, huber_weights
 from rsea_core.identify.multistep.steps import (
     Start,
@@ -27,7 +27,6 @@ LEAST_STEP = 1e-5  # of the unknowns
 ALIKE = 4.0  # factor within which a step stays: simulations are used again
 MOST_KEPT = 1e8  # bytes of residuals
 ROWS_OF_RUN = 1000  # as work: what a run costs beside its rows
-OF_STEPS = 0.3  # of the work of a row with one step of the engine
 STRETCHES = 40  # over all recordings, at least two of each
 LEAST_SHARE = 0.01  # of independent innovations
 
@@ -133,7 +132,7 @@ class Estimator:
             first: dict[bytes, int] = {}  # of machines that run alike, whatever their sensors read
             which = [first.setdefault(m.machine, len(first)) for m in machines]
             unlike = [machines[which.index(j)] for j in range(len(first))]
-            count_work(len(unlike) * _work_of_run(e))
+            count_work(len(unlike) * (e.rows * e.finer + ROWS_OF_RUN))
             runs = e.runs(unlike, t.windows)
             runs = runs if len(unlike) == len(machines) else runs[which]
             found.append(e.measured[None] - e.readings(runs, machines, t.windows))
@@ -288,8 +287,3 @@ def initial_estimator(
     if zeros is not None:
         tracks = [prepared(t, zeros=own) for t, own in zip(tracks, zeros, strict=True)]
     return Estimator(problem, tracks)
-
-
-def _work_of_run(e: Experiment) -> float:
-    """What a run of an experiment costs, in rows with one step of the engine each."""
-    return (1.0 - OF_STEPS) * e.rows * e.finer + OF_STEPS * e.replay.grid.total + ROWS_OF_RUN

@@ -19,7 +19,6 @@ from rsea_core import (
 )
 from rsea_core.effects import DriveDelay, GearFriction, LoadFlexibility, LoadFriction
 from rsea_core.engines.fixed_step.layout import STATE_NAMES
-from rsea_core.engines.fixed_step.packed_models import packed_models
 from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.errors import SimulationError
 from rsea_core.numeric.threads import share_out, share_out_all
@@ -282,11 +281,3 @@ def test_rig_without_a_drive_runs_as_a_free_pendulum():
     rows = replay.run(ActuatorModel(rig))
     w = np.sqrt(0.3 * 9.80665 * 0.3 / 0.03)
     np.testing.assert_allclose(rows[:, 1], 0.01 * np.cos(w * TIME), atol=1e-6)
-
-
-def test_a_grid_counts_the_steps_of_all_rows_whatever_the_models():
-    replay = Replay.of(Inputs(time_s=np.array([0.0, 0.01, 0.03, 0.04]), duty=np.zeros(4)),
-                       step_s=4e-3)  # fmt: skip
-    assert replay.grid.total == 3 + 5 + 3 + 3
-    steps = replay.grid.steps(packed_models([replay.numbers(MODEL)]))
-    assert replay.grid.total == steps.sum()

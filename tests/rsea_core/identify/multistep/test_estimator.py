@@ -8,12 +8,11 @@ from rsea_core.effects.registry import LoadFriction
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.multistep.criteria import STEP_ERROR
-from rsea_core.identify.multistep.estimator import OF_STEPS, ROWS_OF_RUN, Estimator
-from rsea_core.identify.multistep.experiment import FIRST, MultistepProblem
+from rsea_core.identify.multistep.estimator import Estimator
+from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.identify.multistep.log_nuisances import nuisances
 from rsea_core.identify.multistep.tracks import initial_track
-from rsea_core.numeric.work_limit import limited_work
 from tests.cases.one_axis import pendulum_case
 
 
@@ -110,23 +109,3 @@ def test_steps_are_shortened_until_no_innovation_shows_them(tmp_path):
         finer = e.measured[None] - e.readings(e.runs(machine, t.windows), machine, t.windows)
         moved = t.innovations(found) - t.innovations(finer)
         assert np.sqrt(np.mean(moved**2)) <= STEP_ERROR
-
-
-def test_work_is_that_of_rows_steps_and_runs_and_finer_steps_cost_more(case):
-    def work_of(steps):
-        problem = MultistepProblem(case, steps=steps)
-        estimator = Estimator(problem, [initial_track(e) for e in problem.fitted])
-        h = Hypothesis(laws=nuisances(case))
-        with limited_work(np.inf) as work:
-            estimator.residuals([(h, problem.start(h))])
-        return work.done, estimator.tracks
-
-    done, tracks = work_of(FIRST)
-    rows = sum(t.experiment.rows * t.experiment.finer for t in tracks)
-    steps = sum(t.experiment.replay.grid.total for t in tracks)
-    expected = (1.0 - OF_STEPS) * rows + OF_STEPS * steps + ROWS_OF_RUN * len(tracks)
-    assert done == pytest.approx(expected, rel=1e-12)
-    finer, more = work_of(FIRST._replace(fineness=0.25))
-    added = sum(t.experiment.replay.grid.total for t in more) - steps
-    assert finer - done == pytest.approx(OF_STEPS * added, rel=1e-12)
-    assert added > 0
