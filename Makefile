@@ -21,7 +21,8 @@ COMPILE := PYTHONDONTWRITEBYTECODE= OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(B
 IDENTIFY := tests/rsea_core/identify
 WINDOWS := $(IDENTIFY)/multistep/test_diagnosis.py::test_one_recording_of_a_bare_pendulum_shows_its_dry_friction \
 	$(IDENTIFY)/multistep/test_error_filter.py $(IDENTIFY)/locate/test_unknown_input.py::test_the_likelihood_of_readings_is_that_of_the_dense_gaussian \
-	tests/dftfs/proof/wide/truth/test_kernel.py
+	tests/dftfs/proof/wide/truth/test_kernel.py tests/dftfs/cli/test_prove.py::test_cases_follow_the_contract \
+	tests/rsea_core/effects/test_sensor_table.py $(IDENTIFY)/result/test_report_data.py
 FREE_RUNS := tests/rsea_core/effects/test_planted_effects.py::test_a_diagnosis_names_fits_and_writes_it_and_its_file_predicts \
 	tests/dftfs/fem/test_friction.py::test_sliding_block_needs_mu_times_its_weight_and_turns_the_work_into_heat tests/dftfs/fem/test_plasticity.py \
 	tests/dftfs/analysis/strength/test_friction_loop.py::test_no_friction_no_loop
