@@ -106,7 +106,7 @@ def as_svg(figure: Figure, *, name: str, alt: str, caption: str) -> ReportFigure
     buffer = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": name}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph")  # of a file's name, in a font without it
-        # `savefig` draws once more, unseen, before it draws: a quarter of its time
+        # `savefig` would draw the figure once more before, only to lay it out
         FigureCanvasSVG(figure).print_svg(buffer, metadata={"Date": None, "Creator": None})
     return ReportFigure(
         name=name, alt=alt, caption=caption, svg=inline_svg(buffer.getvalue(), name)

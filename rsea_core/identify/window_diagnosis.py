@@ -33,7 +33,7 @@ QUICK_LOOK = Finding(
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
 MOST_WORK = 6e8  # simulated rows of a search, after which it begins nothing further
-QUICK_WORK = 2e7  # of a quick look, after which it also ends what has a first result
+QUICK_WORK = 2e7  # of a quick look, after which a search ends once it has fitted one candidate
 CURTAILED = Finding(
     kind=Kind.METHOD,
     text="the search reached its limit of work: further searches, which could find other laws, were"

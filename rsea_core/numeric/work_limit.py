@@ -15,7 +15,7 @@ from dataclasses import dataclass
 class Work:
     """Work done, its limit, and whether something was left out because of it.
 
-    A strict limit ends what has begun as well, as soon as it has one result.
+    A strict limit also ends a search that has begun, once it has a first result.
     """
 
     most: float
@@ -65,7 +65,7 @@ def no_work_left(*, begun: bool = False) -> bool:
     Parameters
     ----------
     begun : bool
-        Asked while a search goes on that has a first result: only a strict limit ends it.
+        Whether the search that asks has begun and has a first result: only a strict limit ends it.
     """
     work = _current.get()
     if work is None or work.done < work.most or (begun and not work.strict):
