@@ -44,12 +44,15 @@ class Sensors(NamedTuple):
     errors: NDArray  # (3 or 0, n) memory of the tables, filled row by row
 
 
+NO_SENSORS = Sensors(np.zeros((0, NODES)), np.zeros((0, 3)), np.zeros((0, 0)))
+
+
 def controller_sensors(terms: Iterable[Term], rows: int) -> Sensors:
     """What a model's terms put between the truth and a controller."""
     terms = tuple(terms)
     columns = {getattr(term, "column", None) for term in terms}
     if not columns & set(READ_BY_CONTROLLERS):
-        return Sensors(np.zeros((0, NODES)), np.zeros((0, 3)), np.zeros((0, rows)))
+        return NO_SENSORS
     pairs = [_sensor(terms, column, rows) for column in READ_BY_CONTROLLERS]
     noise = np.ascontiguousarray(np.array([noise for _, noise in pairs]).T)
     numbers = np.zeros((len(pairs), max(own.size for own, _ in pairs)))

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,6 +100,11 @@ class ActuatorModel:
         for law in laws:
             if laws.count(law) > 1:
                 raise TermError(f"{law[0]} ({law[1]}) at {law[2]} is there twice: keep one")
+
+    @cached_property
+    def kept(self) -> dict:
+        """What is computed of this model alone, kept by whoever computes it for the next use."""
+        return {}
 
     def with_terms(self, *terms: Term) -> "ActuatorModel":
         """This model with more terms."""

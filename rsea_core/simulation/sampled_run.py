@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,7 @@ from rsea_core.effects.sensor_reading import controller_sensors
 from rsea_core.engines.event_driven.energy_balance import energy_ledger, internal_signals
 from rsea_core.engines.event_driven.energy_ledger import EnergyLedger
 from rsea_core.engines.event_driven.open_loop import playback
-from rsea_core.engines.linear.linearise import step_length_s
+from rsea_core.engines.linear.linearise import fastest_per_s, step_length_s
 from rsea_core.engines.piecewise_linear.machine import LinearMachine, obstacle_of, require_done
 from rsea_core.engines.piecewise_linear.run import NOT_HERE, Runner, rows_of
 from rsea_core.errors import InputError, SimulationError
@@ -36,6 +36,48 @@ BEHIND = {
     k.TO: "link_angle_rad",
     k.WO: "link_velocity_rad_per_s",
 }
+
+
+class Numbers(NamedTuple):
+    """What a model, its command and its load say of every run.
+
+    Attributes
+    ----------
+    fastest_per_s : float
+        See `linearise.fastest_per_s`.
+    longest_s : float
+        The step that it allows.
+    obstacle : str or None
+        Why the piecewise linear engine cannot run this, None where it can.
+    linear : LinearMachine or None
+        Then for that engine.
+    """
+
+    plant: mp.Plant
+    spring: SpringTable
+    fx: NDArray
+    fastest_per_s: float
+    longest_s: float
+    obstacle: str | None
+    linear: LinearMachine | None
+
+    @classmethod
+    def of(cls, model: ActuatorModel, command_name: str | None, load: Load) -> "Numbers":
+        """Kept with the model, which does not change; but where a user's effect acts: its
+        compiled function may be another one in the next run."""
+        key = ("sampled run", command_name, load)
+        if key not in model.kept:
+            plant = model.plant(command_name, load)
+            spring, fx = model.spring_table(load), model.effects(command_name, load)
+            obstacle = obstacle_of(plant, spring.regions, fx)
+            linear = LinearMachine.of(plant, spring.regions, fx) if obstacle is None else None
+            fastest = fastest_per_s(plant, spring, fx)
+            longest = step_length_s(plant, fastest, None)
+            made = cls(plant, spring, fx, fastest, longest, obstacle, linear)
+            if fx[e.OUTSIDE] != 0.0:
+                return made
+            model.kept[key] = made
+        return model.kept[key]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,32 +121,24 @@ class SampledRun:
     reference_name: str | None = None
 
     @cached_property
-    def numbers(self) -> tuple[mp.Plant, SpringTable, NDArray]:
-        """Plant, spring and effects."""
-        given = self.command_name, self.load
-        return (
-            self.model.plant(*given),
-            self.model.spring_table(self.load),
-            self.model.effects(*given),
-        )
+    def numbers(self) -> Numbers:
+        """Plant, spring and effects, and what follows from them."""
+        return Numbers.of(self.model, self.command_name, self.load)
 
     def not_exact(self) -> str | None:
         """Why the piecewise linear engine cannot run this, None where it can."""
-        if self.step_s is not None:
-            return "a step length was given"
-        plant, spring, fx = self.numbers
-        return obstacle_of(plant, spring.regions, fx)
+        return self.numbers.obstacle if self.step_s is None else "a step length was given"
 
     def trajectory(
         self,
+        time_s: NDArray,
         columns: dict[str, NDArray],
         engine: str,
         reason: str | None,
         ledger: EnergyLedger | Callable[[], EnergyLedger],
     ) -> Trajectory:
-        """The result, by its columns from the wheel on."""
-        spring = self.numbers[1]
-        followed = None
+        """The result, by its times, which it keeps, and its columns from the wheel on."""
+        spring, followed = self.numbers.spring, None
         if self.reference_name is not None:
             followed = read_only(np.array(self.reference[:, 0]))
         return Trajectory(
@@ -113,7 +147,7 @@ class SampledRun:
             command_name=self.command_name,
             reference=followed,
             reference_name=self.reference_name,
-            time_s=read_only(np.array(self.time_s)),
+            time_s=read_only(time_s),
             **columns,
             engine=engine,
             engine_reason=reason,
@@ -132,8 +166,9 @@ def solve(run: SampledRun, engine: str | None) -> Trajectory:
     """
     if engine not in (None, PIECEWISE_LINEAR, EVENT_DRIVEN):
         raise InputError(f"engine = {engine!r} must be {PIECEWISE_LINEAR!r} or {EVENT_DRIVEN!r}")
-    plant, spring, fx = run.numbers
-    longest = step_length_s(plant, spring, fx, run.step_s)
+    longest = run.numbers.longest_s
+    if run.step_s is not None:
+        longest = step_length_s(run.numbers.plant, run.numbers.fastest_per_s, run.step_s)
     reason = "it was asked for" if engine == EVENT_DRIVEN else run.not_exact()
     if reason is None:
         found = _piecewise_linear(run)
@@ -147,13 +182,12 @@ def solve(run: SampledRun, engine: str | None) -> Trajectory:
 
 def _piecewise_linear(run: SampledRun) -> Trajectory | str:
     """By exact exponentials, or why the rows do not allow it."""
-    plant, spring, fx = run.numbers
-    machine = LinearMachine.of(plant, spring.regions, fx)
+    plant, machine, time = run.numbers.plant, run.numbers.linear, np.array(run.time_s, float)
     rows = rows_of(
         machine,
-        run.time_s,
+        time,
         run.reference,
-        controller_sensors(run.model.terms, run.time_s.size),
+        controller_sensors(run.model.terms, time.size),
         start_rad=run.initial_angles_rad,
         held=run.held,
         rows_per_sample=run.rows_per_sample,
@@ -178,7 +212,7 @@ def _piecewise_linear(run: SampledRun) -> Trajectory | str:
     columns |= {name: log[pk.LOG_TIMES + j] for j, name in enumerate(TIMES)}
     columns |= {BEHIND[at]: log[pk.N_LOG + j] for j, at in enumerate(machine.behind)}
     ledger = partial(_played_back_ledger, run, columns["command"])
-    return run.trajectory(columns, PIECEWISE_LINEAR, None, ledger)
+    return run.trajectory(time, columns, PIECEWISE_LINEAR, None, ledger)
 
 
 def _played_back_ledger(run: SampledRun, command: NDArray) -> EnergyLedger:
@@ -189,14 +223,14 @@ def _played_back_ledger(run: SampledRun, command: NDArray) -> EnergyLedger:
         run, controller=playback(), parameters=np.zeros(1), state=np.zeros(1),
         reference=reference, rows_per_sample=1, delay_samples=0, command_limit=np.inf,
     )  # fmt: skip
-    plant, spring, fx = run.numbers
-    log, internal = _integrated(known, step_length_s(plant, spring, fx, None))
+    plant, spring, fx = run.numbers[:3]
+    log, internal = _integrated(known, run.numbers.longest_s)
     return energy_ledger(plant, spring, fx, log, internal)
 
 
 def _event_driven(run: SampledRun, longest_s: float, reason: str) -> Trajectory:
     """By steps of order 8 and located events."""
-    plant, spring, fx = run.numbers
+    plant, spring, fx = run.numbers[:3]
     log, internal = _integrated(run, longest_s)
     columns = _signals(plant, log.T, k.LOG_TORQUE, k.LOG_COMMAND, k.LOG_UNSATURATED)
     columns |= {
@@ -209,12 +243,12 @@ def _event_driven(run: SampledRun, longest_s: float, reason: str) -> Trajectory:
     }
     columns |= internal_signals(fx, internal, run.model.terms)
     ledger = energy_ledger(plant, spring, fx, log, internal)
-    return run.trajectory(columns, EVENT_DRIVEN, reason, ledger)
+    return run.trajectory(np.array(run.time_s), columns, EVENT_DRIVEN, reason, ledger)
 
 
 def _integrated(run: SampledRun, longest_s: float) -> tuple[NDArray, NDArray]:
     """Log (n, N_LOG) and memory ((n or 0), N_Y) of the event-driven engine."""
-    plant, spring, fx = run.numbers
+    plant, spring, fx = run.numbers[:3]
     n = run.time_s.size
     held = run.held
     if held is None:

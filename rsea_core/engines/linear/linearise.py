@@ -170,8 +170,8 @@ def fastest_per_s(plant: mp.Plant, spring: SpringTable, fx: NDArray) -> float:
     return max(fastest_mode_per_s(plant, spring), of_terms)
 
 
-def step_length_s(plant: mp.Plant, spring: SpringTable, fx: NDArray, step_s: float | None) -> float:
-    """The integration step: the asked one, or the one that the fastest mode allows.
+def step_length_s(plant: mp.Plant, fastest: float, step_s: float | None) -> float:
+    """The integration step: the asked one, or the one that `fastest_per_s` allows.
 
     Raises
     ------
@@ -179,7 +179,6 @@ def step_length_s(plant: mp.Plant, spring: SpringTable, fx: NDArray, step_s: flo
         If the asked step is too long for the fastest mode, or that mode is so fast that only
         a smaller model makes sense.
     """
-    fastest = fastest_per_s(plant, spring, fx)
     if fastest > FASTEST_SENSIBLE_per_s:
         raise InputError(
             f"the fastest mode, {fastest:.3g} rad/s, is above {FASTEST_SENSIBLE_per_s:.0g} rad/s:"

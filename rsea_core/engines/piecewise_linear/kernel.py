@@ -15,6 +15,7 @@ import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.modes as pm
 import rsea_core.engines.piecewise_linear.whole_row as whole_row
 import rsea_core.machine.plant as mp
+from rsea_core.engines.piecewise_linear.controller_call import call_controller
 from rsea_core.numeric.source_version import SOURCE_VERSION
 from rsea_core.numeric.unowned import unowned
 
@@ -159,14 +160,16 @@ def _read(plant, rows, row, z, torque, noisy, log, signals):
 def _command(fx, rows, controller, parameters, state, signals, commands):
     """What acts on the machine from this sample on; `commands`: answer, waiting, acting."""
     answer, waiting, acting = commands[0], commands[1], commands[2]
-    controller(parameters, state, signals, answer)
-    for m in range(k.N_COMMANDS):
-        acting[m] = waiting[m] if rows.delay_samples == 1 else answer[m]
-        waiting[m] = answer[m]
-    acting[k.COMMAND] = min(max(acting[k.COMMAND], -rows.command_limit), rows.command_limit)
+    call_controller(controller, parameters, state, signals, answer)
+    command, unsaturated = answer[k.COMMAND], answer[k.UNSATURATED]
+    if rows.delay_samples == 1:
+        command, waiting[k.COMMAND] = waiting[k.COMMAND], command
+        unsaturated, waiting[k.UNSATURATED] = waiting[k.UNSATURATED], unsaturated
+    command = min(max(command, -rows.command_limit), rows.command_limit)
+    acting[k.COMMAND], acting[k.UNSATURATED] = command, unsaturated
     if fx[e.DEAD_ZONE] + fx[e.ROUNDED_ZONE] > 0.0:
-        return e.acting_command(fx, acting[k.COMMAND])
-    return acting[k.COMMAND]
+        return e.acting_command(fx, command)
+    return command
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -182,14 +185,14 @@ def _write_rest(rows, work, row, acting, log):
 
 @njit(error_model="numpy", forceinline=True)
 def _whole(modes, fixed, now, command, z, sines, fastest):
-    """A step of the whole row, `sines` of gravity at its start: (smooth, states, sines)."""
+    """A step of the whole row, gravity's `sines` at its start: (smooth, states, sines)."""
     if fixed.gravity == 0.0:
         return True, whole_row.moved(modes.steps, now.slot, command, z, (0.0, 0.0, 0.0)), sines
     steps, slot = modes.steps, now.slot
-    force = whole_row.force_of(modes.systems, fixed, slot, command, z, sines)
+    force = whole_row.force_of(modes.systems, slot, command, z, sines)
     z1 = whole_row.moved(steps, slot, command, z, force)
     predicted, sines1 = z1[3], whole_row.sine_near(z1[3] - z[3], sines)
-    smooth, z1 = whole_row.with_high_order(steps, fixed, slot, z1, force, sines1, fastest)
+    smooth, z1 = whole_row.with_high_order(steps, fixed, now, z1, force, sines1, fastest)
     smooth = smooth and abs(predicted - z[3]) < whole_row.NEAR
     return smooth, z1, whole_row.sine_very_near(z1[3] - predicted, sines1)
 
@@ -215,13 +218,13 @@ def _changes(plant, now, z, z1):
 
 
 @njit(error_model="numpy")
-def _first(machine, rows, y):
+def _first(machine, modes, rows, y):
     """What a run does not change, and what holds in its first row."""
     fixed = whole_row.fixed_of(machine, rows.row_s, rows.angle.size > 0)
     mode = sw.first_mode(machine.plant, machine.fx, y, rows.start_s)
     output = y[k.TB] if machine.fx[e.BACKLASH] > 0.0 else y[k.TW]
     region = pe.region_of(machine.spring, output - y[k.TL])
-    return fixed, mode, region, whole_row.now_of(machine, fixed, mode, region, -1, 0.0, y)
+    return fixed, mode, region, whole_row.now_of(machine, modes, fixed, mode, region, -1, 0.0, y)
 
 
 @njit(error_model="numpy", inline="always")
@@ -232,10 +235,10 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     signals, acts, commands = work.signals, work.acts, work.commands
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
     remembers, delayed = fx[e.INTERNAL_STATES] != 0.0, fx[e.COMMAND_DELAY] > 0.0
-    fixed, mode, region, now = _first(machine, rows, y)
+    fixed, mode, region, now = _first(machine, modes, rows, y)
     z = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
     last, command = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0
-    turning, sines = False, (0.0, 1.0)  # gravity's sine and cosine, turned from row to row
+    turning, sines = False, (0.0, 0.0)  # gravity times sine and cosine, turned from row to row
     for row in range(n):
         torque = now.c0 + now.c1 * (z[1] - z[3] - now.anchor)
         if remembers or not fixed.elastic:
@@ -257,7 +260,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
         if now.known and rows.start_s + (row + 1) * row_s < now.edge_s:
             if fixed.gravity != 0.0 and (row % RENEWED == 0 or not turning):
                 angle = z[3] + fixed.gravity_offset
-                sines = (np.sin(angle), np.cos(angle))
+                sines = (fixed.gravity * np.sin(angle), fixed.gravity * np.cos(angle))
             smooth, z1, sines1 = _whole(modes, fixed, now, command, z, sines, work.fastest[0])
             passed = smooth and whole_row.stays(modes.systems, fx, fixed, now, command, z, z1, last)
         turning = passed
@@ -275,7 +278,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
                 return status, row
             z1 = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
             slot = -1 if fixed.never else pm.slot_of(machine, modes, work, mode, region)
-            now = whole_row.now_of(machine, fixed, mode, region, slot, command, y)
+            now = whole_row.now_of(machine, modes, fixed, mode, region, slot, command, y)
         if fixed.algebraic:
             y[k.IM], _ = eq.current_and_voltage(plant, fx, mode, command, y)
             z1 = (y[k.IM], z1[1], z1[2], z1[3], z1[4])
@@ -309,5 +312,6 @@ run = _cached(SOURCE_VERSION)
 """run(machine, modes, work, rows, controller, parameters, state, log) -> (status, last row)
 
 Compiled. `modes` and `work` are of `modes.room` for this machine and the length of its rows;
-`controller` has the signature `equations.CONTROLLER`; `log` (N_LOG + behind, n) is filled.
+`controller` is the address of a function of the signature `states.CONTROLLER`; `log`
+(N_LOG + behind, n) is filled.
 """

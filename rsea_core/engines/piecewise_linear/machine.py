@@ -51,10 +51,13 @@ class LinearMachine:
     numbers : modes.Machine
     behind : (b,) int array
         Places in the state of what moves behind backlash or a link.
+    timed : (4,) bool array
+        Which times it can spend: current limit, contact, wheel and load held.
     """
 
     numbers: Machine
     behind: NDArray
+    timed: NDArray
 
     @classmethod
     def of(cls, plant: mp.Plant, regions: NDArray, effects: NDArray) -> "LinearMachine":
@@ -72,7 +75,9 @@ class LinearMachine:
         lines = _lines(regions)
         behind = [k.TB, k.WB] * bool(fx[e.BACKLASH]) + [k.TO, k.WO] * bool(fx[e.LINK_STIFFNESS])
         numbers = Machine(plant, lines, fx, _states(fx, behind), _events(plant, lines, fx))
-        return cls(numbers=numbers, behind=np.array(behind, np.int64))
+        limited, touches = plant.current_limit < np.inf, plant.contact_angle < np.inf
+        timed = [limited, touches, fx[e.WHEEL_DRY] != 0.0, fx[e.LOAD_DRY] != 0.0]
+        return cls(numbers=numbers, behind=np.array(behind, np.int64), timed=np.array(timed))
 
 
 def obstacle(model: ActuatorModel, load: Load, command_name: str | None = "duty") -> str | None:

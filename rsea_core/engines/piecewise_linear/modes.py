@@ -195,10 +195,10 @@ def _read_system(machine, work, mode, region, system):
 def apply_system(system, n, vector, into):
     """into = A vector."""
     for j in range(n):
-        into[j] = 0.0
-    for column in range(n):
-        for j in range(n):
-            into[j] += system[STATES + column, j] * vector[column]
+        value = 0.0
+        for column in range(n):
+            value += system[STATES + column, j] * vector[column]
+        into[j] = value
 
 
 @njit(error_model="numpy")
@@ -325,10 +325,11 @@ def step(machine, modes, work, slot, level, command, out):
     smooth, gravity = True, machine.plant.gravity
     if gravity != 0.0 and not is_held(machine.plant):
         angle = moved[k.TL] + machine.plant.gravity_offset
-        third, fourth = high_derivatives(
+        missing, slope = missing_at_end(
             h, force[0], force[1], force[2], -gravity * np.sin(angle),
             -gravity * np.cos(angle) * moved[k.WL],
         )  # fmt: skip
+        third, fourth = high_derivatives(hermite(h), missing, slope)
         missed = steps[slot, level, THIRD, k.TL] * third * gravity
         smooth = is_smooth(
             steps[slot, level, THIRD, k.WL] * third, steps[slot, level, FOURTH, k.WL] * fourth,
@@ -344,11 +345,22 @@ def step(machine, modes, work, slot, level, command, out):
 
 
 @njit(error_model="numpy", forceinline=True)
-def high_derivatives(h, force, rate, curve, end, end_rate):
-    """Third and fourth derivative of g with which it and its slope at a step's end are met."""
-    missing = end - (force + h * (rate + 0.5 * h * curve))
-    slope = h * (end_rate - rate - h * curve)
-    return 6.0 * (4.0 * missing - slope) / h**3, 24.0 * (slope - 3.0 * missing) / h**4
+def hermite(h):
+    """Factors of `high_derivatives` for a step."""
+    return 24.0 / h**3, 6.0 / h**2, 72.0 / h**4
+
+
+@njit(error_model="numpy", forceinline=True)
+def missing_at_end(h, force, rate, curve, end, end_rate):
+    """What g_0, g_1, g_2 leave of g and of its slope at a step's end."""
+    return end - (force + h * (rate + 0.5 * h * curve)), end_rate - (rate + h * curve)
+
+
+@njit(error_model="numpy", forceinline=True)
+def high_derivatives(factors, missing, slope):
+    """Third and fourth derivative of g that add what is missing; factors: `hermite`."""
+    by_value, by_slope, fourth_by_value = factors
+    return by_value * missing - by_slope * slope, by_value * slope - fourth_by_value * missing
 
 
 @njit(error_model="numpy", forceinline=True)

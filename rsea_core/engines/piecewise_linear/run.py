@@ -1,6 +1,8 @@
 """Runs of the exact engine from Python: rows in, a log out."""
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,13 +11,14 @@ import rsea_core.engines.piecewise_linear.events as pe
 import rsea_core.engines.piecewise_linear.kernel as pk
 from rsea_core.effects.sensor_reading import Sensors
 from rsea_core.engines.piecewise_linear.machine import LinearMachine
-from rsea_core.engines.piecewise_linear.modes import room
+from rsea_core.engines.piecewise_linear.modes import Modes, Work, room
 
 NOT_HERE = {
     pe.NOT_EVEN: "its rows are not evenly spaced",
     pe.TOO_STIFF: "a mode is too fast for its rows",
 }
 """Why rows do not allow the exact engine, by its status."""
+NOT_HELD = np.zeros(0)  # a motion of the load that is not given
 
 
 def rows_of(
@@ -44,14 +47,7 @@ def rows_of(
     noise : (float, float, float)
         Standard deviations of the readings of motor angle, load angle and current.
     """
-    plant, fx = machine.numbers.plant, machine.numbers.fx
-    angle, speed = (np.zeros(0), np.zeros(0)) if held is None else held
-    timed = (
-        plant.current_limit < np.inf,
-        plant.contact_angle < np.inf,
-        fx[pk.e.WHEEL_DRY] != 0.0,
-        fx[pk.e.LOAD_DRY] != 0.0,
-    )
+    angle, speed = (NOT_HELD, NOT_HELD) if held is None else map(np.array, held)
     return pk.Rows(
         start_s=float(time_s[0]),
         row_s=float(time_s[-1] - time_s[0]) / (time_s.size - 1),
@@ -62,29 +58,49 @@ def rows_of(
         load_noise_rad=float(noise[1]),
         current_noise_A=float(noise[2]),
         seed=int(seed),
-        wheel_start_rad=float(start_rad[0]) / plant.gear_ratio,
+        wheel_start_rad=float(start_rad[0]) / machine.numbers.plant.gear_ratio,
         load_start_rad=float(start_rad[1] if held is None else angle[0]),
         time=np.require(time_s, float, ("C", "W")),  # copied where it is read-only
         reference=np.require(reference, float, ("C", "W")),
-        angle=np.array(angle, dtype=float),
-        speed=np.array(speed, dtype=float),
-        timed=np.array(timed),
+        angle=angle,
+        speed=speed,
+        timed=machine.timed,
         behind=machine.behind,
         sensors=sensors,
     )
 
 
+_ROOMS = threading.local()
+ROOMS_KEPT = 4  # of a thread
+
+
+@contextmanager
+def _room(machine: LinearMachine, row_s: float) -> Iterator[tuple[Modes, Work]]:
+    """Memory of one run, with the matrices that earlier runs of this thread made."""
+    rooms: list = _ROOMS.__dict__.setdefault("idle", [])
+    known = (i for i, (of, modes, _) in enumerate(rooms) if of is machine and modes.row_s == row_s)
+    at = next(known, None)
+    mine = (machine, *room(machine.numbers, row_s)) if at is None else rooms.pop(at)
+    yield mine[1:]
+    rooms.append(mine)
+    del rooms[:-ROOMS_KEPT]
+
+
 class Runner:
-    """Runs one machine again and again, its matrices made once; for one thread at a time."""
+    """Runs one machine again and again into one log; for one thread at a time."""
 
     def __init__(self, machine: LinearMachine, rows: pk.Rows):
-        self._machine = machine.numbers
-        self._modes, self._work = room(machine.numbers, rows.row_s)
-        self.log = np.zeros((pk.N_LOG + machine.behind.size, rows.time.size))
+        self._machine = machine
+        self.log = np.empty((pk.N_LOG + machine.behind.size, rows.time.size))
+        self.log[pk.LOG_READ_MOTOR :] = 0.0  # what no run may write
 
     def run(self, rows: pk.Rows, controller, parameters: NDArray, state: NDArray):
-        """Fill `log`; (status, last row) of `events`. parameters (p,), state (s,) are copied."""
-        return pk.run(
-            self._machine, self._modes, self._work, rows, controller,
-            np.array(parameters, dtype=float), np.array(state, dtype=float), self.log,
-        )  # fmt: skip
+        """Fill `log` by a compiled controller: (status, last row) of `events`.
+
+        parameters (p,) and state (s,) are copied.
+        """
+        with _room(self._machine, rows.row_s) as (modes, work):
+            return pk.run(
+                self._machine.numbers, modes, work, rows, controller.address,
+                np.array(parameters, dtype=float), np.array(state, dtype=float), self.log,
+            )  # fmt: skip

@@ -19,6 +19,7 @@ def taylor_series(machine, modes, work, slot, command):
         series[0, j] = work.y[states[j]]
     angle = work.y[k.TL] + machine.plant.gravity_offset
     gravity_sines[0, 0], gravity_sines[1, 0] = np.sin(angle), np.cos(angle)
+    inverse = 1.0  # of the order
     for order in range(pm.TERMS):
         pm.apply_system(system, n, series[order], work.moved)
         force = work.force[order] if held and order < 2 else 0.0
@@ -29,13 +30,15 @@ def taylor_series(machine, modes, work, slot, command):
                     turn = i * series[i, k.TL]
                     sine += turn * gravity_sines[1, order - i]
                     cosine -= turn * gravity_sines[0, order - i]
-                gravity_sines[0, order], gravity_sines[1, order] = sine / order, cosine / order
+                gravity_sines[0, order] = sine * inverse
+                gravity_sines[1, order] = cosine * inverse
             force = -gravity * gravity_sines[0, order]
         given = 1.0 if order == 0 else 0.0
+        inverse = 1.0 / (order + 1)
         for j in range(n):
             value = work.moved[j] + system[pm.FORCE, j] * force
             value += given * (system[pm.COMMAND, j] * command + system[pm.CONSTANT, j])
-            series[order + 1, j] = value / (order + 1)
+            series[order + 1, j] = value * inverse
 
 
 @njit(error_model="numpy")

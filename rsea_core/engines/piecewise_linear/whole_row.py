@@ -20,12 +20,15 @@ from rsea_core.machine.spring_table import ANCHOR, C0, C1, UPPER
 SINE_3, SINE_5, SINE_7 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0
 COSINE_4, COSINE_6 = -1.0 / 24.0, 1.0 / 720.0
 NEAR = 0.02  # rad: there the series of sine and cosine are exact to the last bit
+States = tuple[float, float, float, float, float]
+NONE: States = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Fixed(NamedTuple):
     """What a run does not change."""
 
     row_s: float
+    hermite: tuple[float, float, float]  # `modes.hermite` of a row
     gravity: float
     gravity_offset: float
     limit_A: float
@@ -56,6 +59,8 @@ class Now(NamedTuple):
     load_applied_Nm: float  # on a load that sticks, without the spring's torque
     load_level: float  # of friction that holds it
     edge_s: float  # when the disturbance next begins or ends
+    by_missing: States  # what gravity adds to the states, see `modes.missing_at_end`
+    by_slope: States
 
 
 @njit(error_model="numpy")
@@ -69,15 +74,37 @@ def fixed_of(machine, row_s, given):
     never = given or (limited and algebraic)
     never = never or plant.structure == mp.RIGID_HELD or fx[e.INTERNAL_STATES] != 0.0
     return Fixed(
-        row_s, plant.gravity, plant.gravity_offset, plant.current_limit, plant.contact_angle,
-        plant.torque_per_ampere, elastic,
+        row_s, pm.hermite(row_s), plant.gravity, plant.gravity_offset, plant.current_limit,
+        plant.contact_angle, plant.torque_per_ampere, elastic,
         fx[e.GEAR_DRIVE_LOSS] != 0.0 or fx[e.GEAR_BACKDRIVE_LOSS] != 0.0,
         never or fx[e.COMMAND_DELAY] > 0.0, algebraic,
     )  # fmt: skip
 
 
+@njit(error_model="numpy", forceinline=True)
+def _to_state(steps, slot, factors, j):
+    """What gravity's value and its slope that are missing at a row's end add to a state."""
+    third, fourth = steps[slot, 0, pm.THIRD, j], steps[slot, 0, pm.FOURTH, j]
+    by_value, by_slope, fourth_by_value = factors
+    return by_value * third - fourth_by_value * fourth, by_value * fourth - by_slope * third
+
+
 @njit(error_model="numpy")
-def now_of(machine, fixed, mode, region, slot, command, y):
+def _gravity_to_states(modes, fixed, slot):
+    """The same for the five states: those of the value, those of the slope."""
+    current = _to_state(modes.steps, slot, fixed.hermite, k.IM)
+    wheel = _to_state(modes.steps, slot, fixed.hermite, k.TW)
+    speed = _to_state(modes.steps, slot, fixed.hermite, k.WW)
+    load = _to_state(modes.steps, slot, fixed.hermite, k.TL)
+    load_speed = _to_state(modes.steps, slot, fixed.hermite, k.WL)
+    return (
+        (current[0], wheel[0], speed[0], load[0], load_speed[0]),
+        (current[1], wheel[1], speed[1], load[1], load_speed[1]),
+    )
+
+
+@njit(error_model="numpy")
+def now_of(machine, modes, fixed, mode, region, slot, command, y):
     """What holds in a mode and region; `slot` -1: its matrices are not made."""
     plant, fx, spring = machine.plant, machine.fx, machine.spring
     sticks = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
@@ -95,10 +122,13 @@ def now_of(machine, fixed, mode, region, slot, command, y):
     if fx[e.PULSE] != 0.0 and (mode.pulse or mode.row_time < fx[e.PULSE_START]):
         edge_s = fx[e.PULSE_END] if mode.pulse else fx[e.PULSE_START]
     lower = spring[region - 1, UPPER] if region > 0 else -np.inf
+    by_missing, by_slope = NONE, NONE
+    if known and fixed.gravity != 0.0:
+        by_missing, by_slope = _gravity_to_states(modes, fixed, slot)
     return Now(
         slot, known, spring[region, C0], spring[region, C1], spring[region, ANCHOR], lower,
         spring[region, UPPER], mode.contact, mode.wheel, mode.load, mode.torque_sign, sticks,
-        load_sticks, drive_change, level, edge_s,
+        load_sticks, drive_change, level, edge_s, by_missing, by_slope,
     )  # fmt: skip
 
 
@@ -106,18 +136,18 @@ def now_of(machine, fixed, mode, region, slot, command, y):
 def _sum(steps, slot, j, command, z, force):
     """One state after a step of the whole row."""
     i, wheel, speed, load, load_speed = z
-    given = steps[slot, 0, pm.COMMAND, j] * command + steps[slot, 0, pm.CONSTANT, j]
     forced = steps[slot, 0, pm.FORCE, j] * force[0] + steps[slot, 0, pm.RATE, j] * force[1]
-    forced += steps[slot, 0, pm.CURVE, j] * force[2]
     drive = steps[slot, 0, pm.STATES, j] * i + steps[slot, 0, pm.STATES + 2, j] * speed
     angles = steps[slot, 0, pm.STATES + 1, j] * wheel + steps[slot, 0, pm.STATES + 3, j] * load
-    return (drive + angles) + (steps[slot, 0, pm.STATES + 4, j] * load_speed + (given + forced))
+    known = (drive + angles) + (steps[slot, 0, pm.STATES + 4, j] * load_speed + forced)
+    given = steps[slot, 0, pm.COMMAND, j] * command + steps[slot, 0, pm.CONSTANT, j]
+    return known + (steps[slot, 0, pm.CURVE, j] * force[2] + given)
 
 
 @njit(error_model="numpy", forceinline=True)
-def _high_order(steps, slot, j, third, fourth):
+def _high_order(now, j, missing, slope):
     """What gravity's third and fourth derivative add to a state."""
-    return steps[slot, 0, pm.THIRD, j] * third + steps[slot, 0, pm.FOURTH, j] * fourth
+    return now.by_missing[j] * missing + now.by_slope[j] * slope
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -125,9 +155,10 @@ def sine_near(turned, gravity_sines):
     """Sine and cosine of an angle that is `turned` from one whose sine and cosine are known."""
     sine, cosine = gravity_sines
     square = turned * turned
-    small = turned * (1.0 + square * (SINE_3 + square * (SINE_5 + square * SINE_7)))
-    less = square * (0.5 + square * (COSINE_4 + square * COSINE_6))
-    return sine + (cosine * small - sine * less), cosine - (sine * small + cosine * less)
+    fourth = square * square
+    small = turned + turned * square * (SINE_3 + square * SINE_5 + fourth * SINE_7)
+    less = square * (0.5 + square * COSINE_4 + fourth * COSINE_6)
+    return (sine - sine * less) + cosine * small, (cosine - cosine * less) - sine * small
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -139,21 +170,17 @@ def sine_very_near(turned, gravity_sines):
 
 
 @njit(error_model="numpy", forceinline=True)
-def force_of(systems, fixed, slot, command, z, gravity_sines):
-    """Gravity's torque and its first two derivatives, by its sine and cosine."""
+def force_of(systems, slot, command, z, gravity_sines):
+    """Gravity's torque and its first two derivatives; `gravity_sines` are times gravity."""
     i, wheel, speed, load, load_speed = z
-    sine, cosine = fixed.gravity * gravity_sines[0], fixed.gravity * gravity_sines[1]
-    acceleration = (
-        systems[slot, pm.STATES + 1, k.WL] * wheel
-        + systems[slot, pm.STATES + 3, k.WL] * load
-        + systems[slot, pm.STATES + 4, k.WL] * load_speed
-        + systems[slot, pm.STATES, k.WL] * i
-        + systems[slot, pm.STATES + 2, k.WL] * speed
-        + systems[slot, pm.COMMAND, k.WL] * command
-        + systems[slot, pm.CONSTANT, k.WL]
-        - systems[slot, pm.FORCE, k.WL] * sine
-    )
-    curve = sine * load_speed * load_speed - cosine * acceleration
+    sine, cosine = gravity_sines
+    drive = systems[slot, pm.STATES, k.WL] * i + systems[slot, pm.STATES + 2, k.WL] * speed
+    angles = systems[slot, pm.STATES + 1, k.WL] * wheel + systems[slot, pm.STATES + 3, k.WL] * load
+    rest = systems[slot, pm.CONSTANT, k.WL] - systems[slot, pm.FORCE, k.WL] * sine
+    known = (drive + angles) + (systems[slot, pm.STATES + 4, k.WL] * load_speed + rest)
+    curve = sine * load_speed * load_speed - cosine * known
+    if systems[slot, pm.COMMAND, k.WL] != 0.0:  # else the command need not be waited for
+        curve -= cosine * systems[slot, pm.COMMAND, k.WL] * command
     return -sine, -cosine * load_speed, curve
 
 
@@ -170,25 +197,25 @@ def moved(steps, slot, command, z, force):
 
 
 @njit(error_model="numpy", forceinline=True)
-def with_high_order(steps, fixed, slot, z, force, gravity_sines, fastest):
+def with_high_order(steps, fixed, now, z, force, gravity_sines, fastest):
     """The states with gravity met at the row's end too, and whether that is enough."""
     i, wheel, speed, load, load_speed = z
-    gravity = fixed.gravity
-    third, fourth = pm.high_derivatives(
-        fixed.row_s, force[0], force[1], force[2], -gravity * gravity_sines[0],
-        -gravity * gravity_sines[1] * load_speed,
-    )  # fmt: skip
-    missed = steps[slot, 0, pm.THIRD, k.TL] * third * gravity
+    slot = now.slot
+    missing, slope = pm.missing_at_end(
+        fixed.row_s, force[0], force[1], force[2], -gravity_sines[0], -gravity_sines[1] * load_speed
+    )
+    third, fourth = pm.high_derivatives(fixed.hermite, missing, slope)
+    missed = steps[slot, 0, pm.THIRD, k.TL] * third * fixed.gravity
     smooth = pm.is_smooth(
         steps[slot, 0, pm.THIRD, k.WL] * third, steps[slot, 0, pm.FOURTH, k.WL] * fourth,
         steps[slot, 0, pm.FORCE, k.WL] * missed, fastest,
     )  # fmt: skip
     return smooth, (
-        i + _high_order(steps, slot, k.IM, third, fourth),
-        wheel + _high_order(steps, slot, k.TW, third, fourth),
-        speed + _high_order(steps, slot, k.WW, third, fourth),
-        load + _high_order(steps, slot, k.TL, third, fourth),
-        load_speed + _high_order(steps, slot, k.WL, third, fourth),
+        i + _high_order(now, k.IM, missing, slope),
+        wheel + _high_order(now, k.TW, missing, slope),
+        speed + _high_order(now, k.WW, missing, slope),
+        load + _high_order(now, k.TL, missing, slope),
+        load_speed + _high_order(now, k.WL, missing, slope),
     )
 
 

@@ -125,6 +125,30 @@ def test_engines_agree_over_machines_and_events(case):
     require_equal(*run_both(ActuatorModel(rig, terms), sine(load)))
 
 
+@pytest.mark.parametrize("case", list(CASES)[::4])
+def test_a_run_is_the_same_to_the_bit_whatever_the_model_ran_before(case):
+    rig, terms, load = CASES[case]
+    model, inputs = ActuatorModel(rig, terms), sine(load)
+    for amplitude, row_s in ((0.9, 1e-3), (0.3, 2e-3), (0.5, 1e-3)):
+        simulate(model, sine(load, amplitude=amplitude, row_s=row_s))
+    again, first = simulate(model, inputs), simulate(ActuatorModel(rig, terms), inputs)
+    others = again.columns()
+    for name, values in first.columns().items():
+        assert np.array_equal(values, others[name]), name
+
+
+def test_rows_that_were_given_are_not_kept():
+    """What a caller changes afterwards changes no result."""
+    time = np.arange(201) * 1e-3
+    duty = 0.5 * np.sin(20.0 * time)
+    found = simulate(ActuatorModel(BENCH), Inputs(time_s=time, duty=duty))
+    kept = found.time_s.copy(), found.command.copy()
+    time += 1.0
+    duty[:] = 0.0
+    assert np.array_equal(found.time_s, kept[0])
+    assert np.array_equal(found.command, kept[1])
+
+
 @pytest.mark.parametrize("row_s", [1e-4, 5e-3])
 def test_engines_agree_for_short_and_long_rows(row_s):
     model = ActuatorModel(LIMITED, (COULOMB, LoadFriction(coulomb_Nm=0.05)))
