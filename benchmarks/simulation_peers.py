@@ -96,10 +96,10 @@ LOOP = {
 }
 
 
-def ran(engine: str | None = None):
-    """The loop as `simulate_closed_loop` runs it, the machine's numbers made each time."""
+def ran(engine: str | None = None, model: ActuatorModel = MODEL):
+    """The loop as `simulate_closed_loop` runs it; a model that has run keeps its matrices."""
     return run_sampled(
-        MODEL, command_name="duty", load=Load(), parameters=GAINS, state=np.zeros(1),
+        model, command_name="duty", load=Load(), parameters=GAINS, state=np.zeros(1),
         engine=engine, **LOOP,
     )  # fmt: skip
 

@@ -99,14 +99,20 @@ def curves() -> list[bool]:
     )
     machine = b1.loaded()
     cases["MuJoCo in Python, 1 ms"] = lambda: b1.peer_mujoco(*machine)
-    names = ["ours, closed loop", "ours, open loop", "ours, event-driven", *cases]
-    spent, found = interleaved(cpu, 4, b1.ran, open_loop, b1.integrator, *cases.values())
-    torques = [found[0].torque_Nm, found[1].torque_Nm, *found[2:]]
+    own = {
+        "ours, closed loop": b1.ran,
+        "ours, open loop": open_loop,
+        "ours, closed loop, a new model": lambda: b1.ran(model=b1.bench(b1.DRY)),
+    }
+    names = [*own, "ours, event-driven", *cases]
+    spent, found = interleaved(cpu, 4, *own.values(), b1.integrator, *cases.values())
+    torques = [*(run.torque_Nm for run in found[: len(own)]), *found[len(own) :]]
     print(f"B1, CPU time for 10 s, rms error of the torque; engine {closed.engine}:")
     errors = [rms(torque - exact) for torque in torques]
     for name, seconds, error in zip(names, spent, errors, strict=True):
         line(name, seconds, error)
-    peers = dict(zip(names[3:], zip(spent[3:], errors[3:], strict=True), strict=True))
+    first = len(own) + 1
+    peers = dict(zip(names[first:], zip(spent[first:], errors[first:], strict=True), strict=True))
     compiled_slope(np.zeros(5), 0.0, 0.0)
     for what, law in (("interpreted", slope), ("compiled", compiled_slope)):
         for tolerance in TOLERANCES:

@@ -209,7 +209,10 @@ def _piecewise_linear(run: SampledRun) -> Trajectory | str:
         if rows.sensors.numbers.shape[0] == 0:
             read = read_only(np.floor(angle / count) * count) if count > 0.0 else angle
         columns[f"encoder_{part}_angle_rad"] = read
-    columns |= {name: log[pk.LOG_TIMES + j] for j, name in enumerate(TIMES)}
+    never = read_only(np.zeros(time.size))
+    columns |= {
+        name: log[pk.LOG_TIMES + j] if machine.timed[j] else never for j, name in enumerate(TIMES)
+    }
     columns |= {BEHIND[at]: log[pk.N_LOG + j] for j, at in enumerate(machine.behind)}
     ledger = partial(_played_back_ledger, run, columns["command"])
     return run.trajectory(time, columns, PIECEWISE_LINEAR, None, ledger)

@@ -24,6 +24,7 @@ UNEVEN = 1e-8  # of a row: by how much rows may differ in length
 # rows of the log: the five nominal states, tau_s, command, unsaturated, the readings of the
 # encoders where a sensor term acts, then times [s], written where `timed`
 LOG_TORQUE, LOG_COMMAND, LOG_UNSATURATED, LOG_READ_MOTOR, LOG_READ_LOAD, LOG_TIMES = range(5, 11)
+NO_FORCE = (0.0, 0.0, 0.0, 0.0)
 LIMITED, CONTACT, WHEEL_STUCK, LOAD_STUCK = range(4)
 N_LOG = LOG_TIMES + 4
 # rows of the log beyond these are the places of `behind`: states that only some machines have
@@ -184,15 +185,14 @@ def _write_rest(rows, work, row, acting, log):
 
 
 @njit(error_model="numpy", forceinline=True)
-def _whole(modes, fixed, now, command, z, sines, fastest):
+def _whole(line, fixed, command, z, sines, fastest):
     """A step of the whole row, gravity's `sines` at its start: (smooth, states, sines)."""
     if fixed.gravity == 0.0:
-        return True, whole_row.moved(modes.steps, now.slot, command, z, (0.0, 0.0, 0.0)), sines
-    steps, slot = modes.steps, now.slot
-    force = whole_row.force_of(modes.systems, slot, command, z, sines)
-    z1 = whole_row.moved(steps, slot, command, z, force)
+        return True, whole_row.moved(line, command, z, NO_FORCE), sines
+    force = whole_row.force_of(line, z, sines)
+    z1 = whole_row.moved(line, command, z, force)
     predicted, sines1 = z1[3], whole_row.sine_near(z1[3] - z[3], sines)
-    smooth, z1 = whole_row.with_high_order(steps, fixed, now, z1, force, sines1, fastest)
+    smooth, z1 = whole_row.with_high_order(line, fixed, command, z1, force, sines1, fastest)
     smooth = smooth and abs(predicted - z[3]) < whole_row.NEAR
     return smooth, z1, whole_row.sine_very_near(z1[3] - predicted, sines1)
 
@@ -218,13 +218,14 @@ def _changes(plant, now, z, z1):
 
 
 @njit(error_model="numpy")
-def _first(machine, modes, rows, y):
+def _first(machine, modes, work, rows):
     """What a run does not change, and what holds in its first row."""
-    fixed = whole_row.fixed_of(machine, rows.row_s, rows.angle.size > 0)
+    fixed, y = whole_row.fixed_of(machine, rows.row_s, rows.angle.size > 0), work.y
     mode = sw.first_mode(machine.plant, machine.fx, y, rows.start_s)
     output = y[k.TB] if machine.fx[e.BACKLASH] > 0.0 else y[k.TW]
     region = pe.region_of(machine.spring, output - y[k.TL])
-    return fixed, mode, region, whole_row.now_of(machine, modes, fixed, mode, region, -1, 0.0, y)
+    now = whole_row.now_of(machine, modes, work, fixed, mode, region, -1, 0.0)
+    return fixed, mode, region, now
 
 
 @njit(error_model="numpy", inline="always")
@@ -232,10 +233,10 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     """Run the sampled loop; `log` (N_LOG + behind, n) is filled. Returns (status, last row)."""
     plant, fx, y, time = machine.plant, machine.fx, work.y, rows.time
     n, row_s, until_sample = time.size, rows.row_s, 0
-    signals, acts, commands = work.signals, work.acts, work.commands
+    signals, acts, commands, line = work.signals, work.acts, work.commands, work.line
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
     remembers, delayed = fx[e.INTERNAL_STATES] != 0.0, fx[e.COMMAND_DELAY] > 0.0
-    fixed, mode, region, now = _first(machine, modes, rows, y)
+    fixed, mode, region, now = _first(machine, modes, work, rows)
     z = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
     last, command = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0
     turning, sines = False, (0.0, 0.0)  # gravity times sine and cosine, turned from row to row
@@ -261,8 +262,8 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             if fixed.gravity != 0.0 and (row % RENEWED == 0 or not turning):
                 angle = z[3] + fixed.gravity_offset
                 sines = (fixed.gravity * np.sin(angle), fixed.gravity * np.cos(angle))
-            smooth, z1, sines1 = _whole(modes, fixed, now, command, z, sines, work.fastest[0])
-            passed = smooth and whole_row.stays(modes.systems, fx, fixed, now, command, z, z1, last)
+            smooth, z1, sines1 = _whole(line, fixed, command, z, sines, work.fastest[0])
+            passed = smooth and whole_row.stays(line, fx, fixed, now, command, z, z1, last)
         turning = passed
         if passed:
             sines = sines1
@@ -278,7 +279,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
                 return status, row
             z1 = (y[k.IM], y[k.TW], y[k.WW], y[k.TL], y[k.WL])
             slot = -1 if fixed.never else pm.slot_of(machine, modes, work, mode, region)
-            now = whole_row.now_of(machine, modes, fixed, mode, region, slot, command, y)
+            now = whole_row.now_of(machine, modes, work, fixed, mode, region, slot, command)
         if fixed.algebraic:
             y[k.IM], _ = eq.current_and_voltage(plant, fx, mode, command, y)
             z1 = (y[k.IM], z1[1], z1[2], z1[3], z1[4])

@@ -92,7 +92,6 @@ class Runner:
     def __init__(self, machine: LinearMachine, rows: pk.Rows):
         self._machine = machine
         self.log = np.empty((pk.N_LOG + machine.behind.size, rows.time.size))
-        self.log[pk.LOG_READ_MOTOR :] = 0.0  # what no run may write
 
     def run(self, rows: pk.Rows, controller, parameters: NDArray, state: NDArray):
         """Fill `log` by a compiled controller: (status, last row) of `events`.

@@ -1,8 +1,12 @@
 """Rows of the nominal five states in which nothing comes near a switch; compiled.
 
-A row costs a product with a small matrix and a few comparisons here, states and matrices in
-registers. What a switch would need to act and go back within the row counts as near: more than
-a quarter of what its value changed over this row and the one before.
+A row costs a product with a small matrix and a few comparisons here, states in registers and all
+numbers of the mode in one array. Each row waits for the one before, so what counts is the longest
+chain of operations from a state to the next: sums are made in pairs, and the command, which comes
+last, enters last.
+
+What a switch would need to act and go back within the row counts as near: more than a quarter of
+what its value changed over this row and the one before.
 """
 
 from typing import NamedTuple
@@ -20,8 +24,12 @@ from rsea_core.machine.spring_table import ANCHOR, C0, C1, UPPER
 SINE_3, SINE_5, SINE_7 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0
 COSINE_4, COSINE_6 = -1.0 / 24.0, 1.0 / 720.0
 NEAR = 0.02  # rad: there the series of sine and cosine are exact to the last bit
-States = tuple[float, float, float, float, float]
-NONE: States = (0.0, 0.0, 0.0, 0.0, 0.0)
+LANE, COLUMNS = pm.LANE, pm.COLUMNS
+# places in `Work.line`: columns of the step's matrix, what gravity's value and its slope that are
+# missing at the row's end add to the states, and the rates of two states
+MISSING, SLOPE = COLUMNS * LANE, (COLUMNS + 1) * LANE
+LOAD_SPEED_RATE = (COLUMNS + 2) * LANE
+CURRENT_RATE = LOAD_SPEED_RATE + COLUMNS
 
 
 class Fixed(NamedTuple):
@@ -43,7 +51,6 @@ class Fixed(NamedTuple):
 class Now(NamedTuple):
     """What holds until the next switch."""
 
-    slot: int
     known: bool  # its rows may be quick
     c0: float
     c1: float
@@ -59,8 +66,6 @@ class Now(NamedTuple):
     load_applied_Nm: float  # on a load that sticks, without the spring's torque
     load_level: float  # of friction that holds it
     edge_s: float  # when the disturbance next begins or ends
-    by_missing: States  # what gravity adds to the states, see `modes.missing_at_end`
-    by_slope: States
 
 
 @njit(error_model="numpy")
@@ -81,32 +86,26 @@ def fixed_of(machine, row_s, given):
     )  # fmt: skip
 
 
-@njit(error_model="numpy", forceinline=True)
-def _to_state(steps, slot, factors, j):
-    """What gravity's value and its slope that are missing at a row's end add to a state."""
-    third, fourth = steps[slot, 0, pm.THIRD, j], steps[slot, 0, pm.FOURTH, j]
-    by_value, by_slope, fourth_by_value = factors
-    return by_value * third - fourth_by_value * fourth, by_value * fourth - by_slope * third
+@njit(error_model="numpy")
+def _fill(line, modes, fixed, slot):
+    """Copy what a row needs of a mode's matrices to `line`: one address, one offset each."""
+    by_value, by_slope, fourth_by_value = fixed.hermite
+    step, system = modes.steps[slot, 0], modes.systems[slot]
+    for column in range(COLUMNS):
+        for j in range(k.N_STATES):
+            line[column * LANE + j] = step[column, j]
+        line[LOAD_SPEED_RATE + column] = system[column, k.WL]
+        line[CURRENT_RATE + column] = system[column, k.IM]
+    for j in range(k.N_STATES):
+        third, fourth = step[pm.THIRD, j], step[pm.FOURTH, j]
+        line[MISSING + j] = by_value * third - fourth_by_value * fourth
+        line[SLOPE + j] = by_value * fourth - by_slope * third
 
 
 @njit(error_model="numpy")
-def _gravity_to_states(modes, fixed, slot):
-    """The same for the five states: those of the value, those of the slope."""
-    current = _to_state(modes.steps, slot, fixed.hermite, k.IM)
-    wheel = _to_state(modes.steps, slot, fixed.hermite, k.TW)
-    speed = _to_state(modes.steps, slot, fixed.hermite, k.WW)
-    load = _to_state(modes.steps, slot, fixed.hermite, k.TL)
-    load_speed = _to_state(modes.steps, slot, fixed.hermite, k.WL)
-    return (
-        (current[0], wheel[0], speed[0], load[0], load_speed[0]),
-        (current[1], wheel[1], speed[1], load[1], load_speed[1]),
-    )
-
-
-@njit(error_model="numpy")
-def now_of(machine, modes, fixed, mode, region, slot, command, y):
+def now_of(machine, modes, work, fixed, mode, region, slot, command):
     """What holds in a mode and region; `slot` -1: its matrices are not made."""
-    plant, fx, spring = machine.plant, machine.fx, machine.spring
+    plant, fx, spring, y = machine.plant, machine.fx, machine.spring, work.y
     sticks = fx[e.WHEEL_DRY] != 0.0 and mode.wheel == 0
     load_sticks = fx[e.LOAD_DRY] != 0.0 and mode.load == 0
     known = slot >= 0 and not fixed.never and mode.limited == 0
@@ -122,32 +121,33 @@ def now_of(machine, modes, fixed, mode, region, slot, command, y):
     if fx[e.PULSE] != 0.0 and (mode.pulse or mode.row_time < fx[e.PULSE_START]):
         edge_s = fx[e.PULSE_END] if mode.pulse else fx[e.PULSE_START]
     lower = spring[region - 1, UPPER] if region > 0 else -np.inf
-    by_missing, by_slope = NONE, NONE
-    if known and fixed.gravity != 0.0:
-        by_missing, by_slope = _gravity_to_states(modes, fixed, slot)
+    if known:
+        _fill(work.line, modes, fixed, slot)
     return Now(
-        slot, known, spring[region, C0], spring[region, C1], spring[region, ANCHOR], lower,
+        known, spring[region, C0], spring[region, C1], spring[region, ANCHOR], lower,
         spring[region, UPPER], mode.contact, mode.wheel, mode.load, mode.torque_sign, sticks,
-        load_sticks, drive_change, level, edge_s, by_missing, by_slope,
+        load_sticks, drive_change, level, edge_s,
     )  # fmt: skip
 
 
 @njit(error_model="numpy", forceinline=True)
-def _sum(steps, slot, j, command, z, force):
-    """One state after a step of the whole row."""
+def _sum(line, j, command, z, force):
+    """One state after a step of the whole row; the command, which comes last, enters last."""
     i, wheel, speed, load, load_speed = z
-    forced = steps[slot, 0, pm.FORCE, j] * force[0] + steps[slot, 0, pm.RATE, j] * force[1]
-    drive = steps[slot, 0, pm.STATES, j] * i + steps[slot, 0, pm.STATES + 2, j] * speed
-    angles = steps[slot, 0, pm.STATES + 1, j] * wheel + steps[slot, 0, pm.STATES + 3, j] * load
-    known = (drive + angles) + (steps[slot, 0, pm.STATES + 4, j] * load_speed + forced)
-    given = steps[slot, 0, pm.COMMAND, j] * command + steps[slot, 0, pm.CONSTANT, j]
-    return known + (steps[slot, 0, pm.CURVE, j] * force[2] + given)
+    states = pm.STATES * LANE + j
+    forced = line[pm.FORCE * LANE + j] * force[0] + line[pm.RATE * LANE + j] * force[1]
+    drive = line[states] * i + line[states + 2 * LANE] * speed
+    angles = line[states + LANE] * wheel + line[states + 3 * LANE] * load
+    curve = line[pm.CURVE * LANE + j]
+    forced += curve * force[2] + line[pm.CONSTANT * LANE + j]
+    known = (drive + angles) + (line[states + 4 * LANE] * load_speed + forced)
+    return known + (line[pm.COMMAND * LANE + j] + curve * force[3]) * command
 
 
 @njit(error_model="numpy", forceinline=True)
-def _high_order(now, j, missing, slope):
+def _added(line, j, missing, slope):
     """What gravity's third and fourth derivative add to a state."""
-    return now.by_missing[j] * missing + now.by_slope[j] * slope
+    return line[MISSING + j] * missing + line[SLOPE + j] * slope
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -170,74 +170,77 @@ def sine_very_near(turned, gravity_sines):
 
 
 @njit(error_model="numpy", forceinline=True)
-def force_of(systems, slot, command, z, gravity_sines):
-    """Gravity's torque and its first two derivatives; `gravity_sines` are times gravity."""
+def force_of(line, z, gravity_sines):
+    """Gravity's torque and its first two derivatives; `gravity_sines` are times gravity.
+
+    The second is the third number plus the fourth times the command.
+    """
     i, wheel, speed, load, load_speed = z
     sine, cosine = gravity_sines
-    drive = systems[slot, pm.STATES, k.WL] * i + systems[slot, pm.STATES + 2, k.WL] * speed
-    angles = systems[slot, pm.STATES + 1, k.WL] * wheel + systems[slot, pm.STATES + 3, k.WL] * load
-    rest = systems[slot, pm.CONSTANT, k.WL] - systems[slot, pm.FORCE, k.WL] * sine
-    known = (drive + angles) + (systems[slot, pm.STATES + 4, k.WL] * load_speed + rest)
+    states = LOAD_SPEED_RATE + pm.STATES
+    drive = line[states] * i + line[states + 2] * speed
+    angles = line[states + 1] * wheel + line[states + 3] * load
+    rest = line[LOAD_SPEED_RATE + pm.CONSTANT] - line[LOAD_SPEED_RATE + pm.FORCE] * sine
+    known = (drive + angles) + (line[states + 4] * load_speed + rest)
     curve = sine * load_speed * load_speed - cosine * known
-    if systems[slot, pm.COMMAND, k.WL] != 0.0:  # else the command need not be waited for
-        curve -= cosine * systems[slot, pm.COMMAND, k.WL] * command
-    return -sine, -cosine * load_speed, curve
+    return -sine, -cosine * load_speed, curve, -cosine * line[LOAD_SPEED_RATE + pm.COMMAND]
 
 
 @njit(error_model="numpy", forceinline=True)
-def moved(steps, slot, command, z, force):
+def moved(line, command, z, force):
     """The five states a row later, by gravity's first three terms."""
     return (
-        _sum(steps, slot, k.IM, command, z, force),
-        _sum(steps, slot, k.TW, command, z, force),
-        _sum(steps, slot, k.WW, command, z, force),
-        _sum(steps, slot, k.TL, command, z, force),
-        _sum(steps, slot, k.WL, command, z, force),
+        _sum(line, k.IM, command, z, force),
+        _sum(line, k.TW, command, z, force),
+        _sum(line, k.WW, command, z, force),
+        _sum(line, k.TL, command, z, force),
+        _sum(line, k.WL, command, z, force),
     )
 
 
 @njit(error_model="numpy", forceinline=True)
-def with_high_order(steps, fixed, now, z, force, gravity_sines, fastest):
+def with_high_order(line, fixed, command, z, force, gravity_sines, fastest):
     """The states with gravity met at the row's end too, and whether that is enough."""
     i, wheel, speed, load, load_speed = z
-    slot = now.slot
     missing, slope = pm.missing_at_end(
-        fixed.row_s, force[0], force[1], force[2], -gravity_sines[0], -gravity_sines[1] * load_speed
-    )
+        fixed.row_s, force[0], force[1], force[2] + force[3] * command, -gravity_sines[0],
+        -gravity_sines[1] * load_speed,
+    )  # fmt: skip
     third, fourth = pm.high_derivatives(fixed.hermite, missing, slope)
-    missed = steps[slot, 0, pm.THIRD, k.TL] * third * fixed.gravity
+    missed = line[pm.THIRD * LANE + k.TL] * third * fixed.gravity
     smooth = pm.is_smooth(
-        steps[slot, 0, pm.THIRD, k.WL] * third, steps[slot, 0, pm.FOURTH, k.WL] * fourth,
-        steps[slot, 0, pm.FORCE, k.WL] * missed, fastest,
+        line[pm.THIRD * LANE + k.WL] * third, line[pm.FOURTH * LANE + k.WL] * fourth,
+        line[pm.FORCE * LANE + k.WL] * missed, fastest,
     )  # fmt: skip
     return smooth, (
-        i + _high_order(now, k.IM, missing, slope),
-        wheel + _high_order(now, k.TW, missing, slope),
-        speed + _high_order(now, k.WW, missing, slope),
-        load + _high_order(now, k.TL, missing, slope),
-        load_speed + _high_order(now, k.WL, missing, slope),
+        i + _added(line, k.IM, missing, slope),
+        wheel + _added(line, k.TW, missing, slope),
+        speed + _added(line, k.WW, missing, slope),
+        load + _added(line, k.TL, missing, slope),
+        load_speed + _added(line, k.WL, missing, slope),
     )
 
 
 @njit(error_model="numpy", forceinline=True)
-def first_change(systems, row_s, slot, command, z):
+def first_change(line, row_s, command, z):
     """What the current would change in a row at the slope with which it begins [A].
 
     The command jumps between rows: the current may rise first and fall then, which neither its
     change over this row nor the one before shows.
     """
-    drive = systems[slot, pm.STATES, k.IM] * z[0] + systems[slot, pm.STATES + 2, k.IM] * z[2]
-    given = systems[slot, pm.COMMAND, k.IM] * command + systems[slot, pm.CONSTANT, k.IM]
+    states = CURRENT_RATE + pm.STATES
+    drive = line[states] * z[0] + line[states + 2] * z[2]
+    given = line[CURRENT_RATE + pm.COMMAND] * command + line[CURRENT_RATE + pm.CONSTANT]
     return row_s * abs(drive + given)
 
 
 @njit(error_model="numpy", forceinline=True)
-def stays(systems, fx, fixed, now, command, z, z1, last):
+def stays(line, fx, fixed, now, command, z, z1, last):
     """Whether nothing came near a switch from z to z1; `last`: what changed in the row before."""
     i, wheel, speed, load, load_speed = z
     i1, wheel1, speed1, load1, load_speed1 = z1
     quarter = 0.25 * fixed.row_s
-    first_A = first_change(systems, fixed.row_s, now.slot, command, z)
+    first_A = first_change(line, fixed.row_s, command, z)
     rise_A = max(last[0], first_A)
     clear = max(abs(i), abs(i1)) + 0.25 * (abs(i1 - i) + rise_A) < fixed.limit_A
     clear = clear and now.wheel * speed1 >= 0.25 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
