@@ -106,6 +106,10 @@ class ActuatorModel:
         """What is computed of this model alone, kept by whoever computes it for the next use."""
         return {}
 
+    def __getstate__(self) -> dict:
+        """Without what is kept: another version of this package may read it."""
+        return {"rig": self.rig, "terms": self.terms}
+
     def with_terms(self, *terms: Term) -> "ActuatorModel":
         """This model with more terms."""
         return replace(self, terms=(*self.terms, *terms))

@@ -5,6 +5,7 @@ differs by at most 1e-9 of its span, times by 1e-9 of the run's. (Order 8 takes 
 than by itself, which alone is good to 4e-9 of the current's span.)
 """
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -135,6 +136,16 @@ def test_a_run_is_the_same_to_the_bit_whatever_the_model_ran_before(case):
     others = again.columns()
     for name, values in first.columns().items():
         assert np.array_equal(values, others[name]), name
+
+
+def test_a_pickled_model_holds_nothing_but_itself():
+    model = ActuatorModel(BENCH, (COULOMB,))
+    found = simulate(model, sine(CONTACT))
+    assert model.kept
+    read = pickle.loads(pickle.dumps(model))
+    assert read == model
+    assert not read.kept
+    assert np.array_equal(simulate(read, sine(CONTACT)).torque_Nm, found.torque_Nm)
 
 
 def test_rows_that_were_given_are_not_kept():
