@@ -38,11 +38,13 @@ BEHIND = {
 }
 
 
-class Numbers(NamedTuple):
-    """What a model, its command and its load say of every run.
+class MachineNumbers(NamedTuple):
+    """What all runs of a model with one command and load have in common.
 
     Attributes
     ----------
+    plant, spring, fx
+        As `ActuatorModel.plant`, `spring_table`, `effects`.
     fastest_per_s : float
         See `linearise.fastest_per_s`.
     longest_s : float
@@ -62,9 +64,11 @@ class Numbers(NamedTuple):
     linear: LinearMachine | None
 
     @classmethod
-    def of(cls, model: ActuatorModel, command_name: str | None, load: Load) -> "Numbers":
-        """Kept with the model, which does not change; but where a user's effect acts: its
-        compiled function may be another one in the next run."""
+    def of(cls, model: ActuatorModel, command_name: str | None, load: Load) -> "MachineNumbers":
+        """Computed once and kept with the model, which does not change.
+
+        Not kept where a user's effect acts: it may have another compiled function in the next run.
+        """
         key = ("sampled run", command_name, load)
         if key not in model.kept:
             plant = model.plant(command_name, load)
@@ -121,9 +125,9 @@ class SampledRun:
     reference_name: str | None = None
 
     @cached_property
-    def numbers(self) -> Numbers:
+    def numbers(self) -> MachineNumbers:
         """Plant, spring and effects, and what follows from them."""
-        return Numbers.of(self.model, self.command_name, self.load)
+        return MachineNumbers.of(self.model, self.command_name, self.load)
 
     def not_exact(self) -> str | None:
         """Why the piecewise linear engine cannot run this, None where it can."""

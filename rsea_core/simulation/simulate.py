@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 from rsea_core.engines.event_driven.open_loop import playback
 from rsea_core.machine.inputs import Inputs
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.simulation.sampled_run import Numbers, SampledRun, solve
+from rsea_core.simulation.sampled_run import MachineNumbers, SampledRun, solve
 from rsea_core.simulation.trajectory import Trajectory
 
 
@@ -46,7 +46,7 @@ def simulate(
     reference = np.zeros((rows, 3))
     if inputs.command_name is not None:
         reference[:, 0] = getattr(inputs, inputs.command_name)
-        lead = Numbers.of(model, inputs.command_name, inputs.load).plant.goal_rate_s
+        lead = MachineNumbers.of(model, inputs.command_name, inputs.load).plant.goal_rate_s
         if lead > 0.0:
             goal, times = reference[:, 0].copy(), inputs.time_s
             reference[1:, 0] += lead * np.diff(goal) / np.diff(times)

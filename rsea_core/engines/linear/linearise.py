@@ -171,7 +171,12 @@ def fastest_per_s(plant: mp.Plant, spring: SpringTable, fx: NDArray) -> float:
 
 
 def step_length_s(plant: mp.Plant, fastest: float, step_s: float | None) -> float:
-    """The integration step: the asked one, or the one that `fastest_per_s` allows.
+    """The integration step: the asked one, or what the `fastest` rate [1/s] allows.
+
+    Parameters
+    ----------
+    fastest : float
+        `fastest_per_s` of the machine.
 
     Raises
     ------

@@ -24,10 +24,10 @@ UNEVEN = 1e-8  # of a row: by how much rows may differ in length
 # rows of the log: the five nominal states, tau_s, command, unsaturated, the readings of the
 # encoders where a sensor term acts, then times [s], written where `timed`
 LOG_TORQUE, LOG_COMMAND, LOG_UNSATURATED, LOG_READ_MOTOR, LOG_READ_LOAD, LOG_TIMES = range(5, 11)
-NO_FORCE = (0.0, 0.0, 0.0, 0.0)
 LIMITED, CONTACT, WHEEL_STUCK, LOAD_STUCK = range(4)
 N_LOG = LOG_TIMES + 4
 # rows of the log beyond these are the places of `behind`: states that only some machines have
+NO_FORCE = (0.0, 0.0, 0.0, 0.0)  # `whole_row.force_of` without gravity
 
 
 class Rows(NamedTuple):
@@ -185,14 +185,14 @@ def _write_rest(rows, work, row, acting, log):
 
 
 @njit(error_model="numpy", forceinline=True)
-def _whole(line, fixed, command, z, sines, fastest):
+def _whole(c, fixed, command, z, sines, fastest):
     """A step of the whole row, gravity's `sines` at its start: (smooth, states, sines)."""
     if fixed.gravity == 0.0:
-        return True, whole_row.moved(line, command, z, NO_FORCE), sines
-    force = whole_row.force_of(line, z, sines)
-    z1 = whole_row.moved(line, command, z, force)
+        return True, whole_row.moved(c, command, z, NO_FORCE), sines
+    force = whole_row.force_of(c, z, sines)
+    z1 = whole_row.moved(c, command, z, force)
     predicted, sines1 = z1[3], whole_row.sine_near(z1[3] - z[3], sines)
-    smooth, z1 = whole_row.with_high_order(line, fixed, command, z1, force, sines1, fastest)
+    smooth, z1 = whole_row.with_high_order(c, fixed, command, z1, force, sines1, fastest)
     smooth = smooth and abs(predicted - z[3]) < whole_row.NEAR
     return smooth, z1, whole_row.sine_very_near(z1[3] - predicted, sines1)
 
@@ -233,7 +233,7 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
     """Run the sampled loop; `log` (N_LOG + behind, n) is filled. Returns (status, last row)."""
     plant, fx, y, time = machine.plant, machine.fx, work.y, rows.time
     n, row_s, until_sample = time.size, rows.row_s, 0
-    signals, acts, commands, line = work.signals, work.acts, work.commands, work.line
+    signals, acts, commands, c = work.signals, work.acts, work.commands, work.coefficients
     noisy = rows.motor_noise_rad > 0.0 or rows.load_noise_rad > 0.0 or rows.current_noise_A > 0.0
     remembers, delayed = fx[e.INTERNAL_STATES] != 0.0, fx[e.COMMAND_DELAY] > 0.0
     fixed, mode, region, now = _first(machine, modes, work, rows)
@@ -262,8 +262,8 @@ def loop(machine, modes, work, rows, controller, parameters, state, log):
             if fixed.gravity != 0.0 and (row % RENEWED == 0 or not turning):
                 angle = z[3] + fixed.gravity_offset
                 sines = (fixed.gravity * np.sin(angle), fixed.gravity * np.cos(angle))
-            smooth, z1, sines1 = _whole(line, fixed, command, z, sines, work.fastest[0])
-            passed = smooth and whole_row.stays(line, fx, fixed, now, command, z, z1, last)
+            smooth, z1, sines1 = _whole(c, fixed, command, z, sines, work.fastest[0])
+            passed = smooth and whole_row.stays(c, fx, fixed, now, command, z, z1, last)
         turning = passed
         if passed:
             sines = sines1

@@ -44,7 +44,7 @@ LEVELS = 27  # lengths of steps: modes up to 3e7 times as fast as the row is lon
 COMMAND, CONSTANT, FORCE, RATE, CURVE, THIRD, FOURTH, STATES = range(8)
 COLUMNS = STATES + k.N_STATES  # of the nominal five
 LANE = 8  # rows of a step's matrix are padded to the width of vector registers
-N_LINE = (COLUMNS + 2) * LANE + 2 * COLUMNS  # see `whole_row`
+N_COEFFICIENTS = (COLUMNS + 2) * LANE + 2 * COLUMNS  # see `whole_row`
 SLOTS = 512  # modes that are kept at a time
 GRAVITY_TOLERANCE = 1e-12  # of the largest speed of the load so far, for a step
 SMALLEST_SPEED = 1e-30  # rad/s
@@ -86,7 +86,7 @@ class Work(NamedTuple):
     derivatives: NDArray  # (1, N_DERIVATIVES)
     signals: NDArray  # (N_SIGNALS,) what a controller reads
     acts: NDArray  # (3,) the last row whose command acts (-1 none), that command, the present row
-    line: NDArray  # (N_LINE,) the present mode's numbers for a row without a switch
+    coefficients: NDArray  # (N_COEFFICIENTS,) of the present mode's rows, see `whole_row`
     commands: NDArray  # (3, N_COMMANDS) a controller's answer, the waiting and the acting one
 
 
@@ -99,7 +99,7 @@ def room(machine: Machine, row_s: float) -> tuple[Modes, Work]:
     modes = Modes(row_s, keys, levels, systems, steps)
     states = (np.zeros(k.N_Y) for _ in range(3))
     shapes = ((3, machine.event_kinds.size), 3, lanes, (TERMS + 1, lanes), (2, TERMS + 1), 4, 1)
-    shapes = (*shapes, (1, k.N_DERIVATIVES), k.N_SIGNALS, 3, N_LINE, (3, k.N_COMMANDS))
+    shapes = (*shapes, (1, k.N_DERIVATIVES), k.N_SIGNALS, 3, N_COEFFICIENTS, (3, k.N_COMMANDS))
     work = Work(*states, *map(np.zeros, shapes))
     return modes, work
 

@@ -1,9 +1,9 @@
 """Rows of the nominal five states in which nothing comes near a switch; compiled.
 
 A row costs a product with a small matrix and a few comparisons here, states in registers and all
-numbers of the mode in one array. Each row waits for the one before, so what counts is the longest
-chain of operations from a state to the next: sums are made in pairs, and the command, which comes
-last, enters last.
+coefficients of the mode in one array. Each row depends on the one before, so that its time is the
+latency of the longest chain of dependent operations: sums are made in pairs, and the command, which
+is known last, enters last.
 
 What a switch would need to act and go back within the row counts as near: more than a quarter of
 what its value changed over this row and the one before.
@@ -25,8 +25,8 @@ SINE_3, SINE_5, SINE_7 = -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5040.0
 COSINE_4, COSINE_6 = -1.0 / 24.0, 1.0 / 720.0
 NEAR = 0.02  # rad: there the series of sine and cosine are exact to the last bit
 LANE, COLUMNS = pm.LANE, pm.COLUMNS
-# places in `Work.line`: columns of the step's matrix, what gravity's value and its slope that are
-# missing at the row's end add to the states, and the rates of two states
+# places in `Work.coefficients`: columns of the step's matrix, what gravity's value and its slope
+# that are missing at the row's end add to the states, and the rates of two states
 MISSING, SLOPE = COLUMNS * LANE, (COLUMNS + 1) * LANE
 LOAD_SPEED_RATE = (COLUMNS + 2) * LANE
 CURRENT_RATE = LOAD_SPEED_RATE + COLUMNS
@@ -87,19 +87,19 @@ def fixed_of(machine, row_s, given):
 
 
 @njit(error_model="numpy")
-def _fill(line, modes, fixed, slot):
-    """Copy what a row needs of a mode's matrices to `line`: one address, one offset each."""
+def _fill(c, modes, fixed, slot):
+    """Copy what a row needs of a mode's matrices to its coefficients `c`."""
     by_value, by_slope, fourth_by_value = fixed.hermite
     step, system = modes.steps[slot, 0], modes.systems[slot]
     for column in range(COLUMNS):
         for j in range(k.N_STATES):
-            line[column * LANE + j] = step[column, j]
-        line[LOAD_SPEED_RATE + column] = system[column, k.WL]
-        line[CURRENT_RATE + column] = system[column, k.IM]
+            c[column * LANE + j] = step[column, j]
+        c[LOAD_SPEED_RATE + column] = system[column, k.WL]
+        c[CURRENT_RATE + column] = system[column, k.IM]
     for j in range(k.N_STATES):
         third, fourth = step[pm.THIRD, j], step[pm.FOURTH, j]
-        line[MISSING + j] = by_value * third - fourth_by_value * fourth
-        line[SLOPE + j] = by_value * fourth - by_slope * third
+        c[MISSING + j] = by_value * third - fourth_by_value * fourth
+        c[SLOPE + j] = by_value * fourth - by_slope * third
 
 
 @njit(error_model="numpy")
@@ -122,7 +122,7 @@ def now_of(machine, modes, work, fixed, mode, region, slot, command):
         edge_s = fx[e.PULSE_END] if mode.pulse else fx[e.PULSE_START]
     lower = spring[region - 1, UPPER] if region > 0 else -np.inf
     if known:
-        _fill(work.line, modes, fixed, slot)
+        _fill(work.coefficients, modes, fixed, slot)
     return Now(
         known, spring[region, C0], spring[region, C1], spring[region, ANCHOR], lower,
         spring[region, UPPER], mode.contact, mode.wheel, mode.load, mode.torque_sign, sticks,
@@ -131,23 +131,23 @@ def now_of(machine, modes, work, fixed, mode, region, slot, command):
 
 
 @njit(error_model="numpy", forceinline=True)
-def _sum(line, j, command, z, force):
-    """One state after a step of the whole row; the command, which comes last, enters last."""
+def _sum(c, j, command, z, force):
+    """One state after a step of the whole row."""
     i, wheel, speed, load, load_speed = z
     states = pm.STATES * LANE + j
-    forced = line[pm.FORCE * LANE + j] * force[0] + line[pm.RATE * LANE + j] * force[1]
-    drive = line[states] * i + line[states + 2 * LANE] * speed
-    angles = line[states + LANE] * wheel + line[states + 3 * LANE] * load
-    curve = line[pm.CURVE * LANE + j]
-    forced += curve * force[2] + line[pm.CONSTANT * LANE + j]
-    known = (drive + angles) + (line[states + 4 * LANE] * load_speed + forced)
-    return known + (line[pm.COMMAND * LANE + j] + curve * force[3]) * command
+    forced = c[pm.FORCE * LANE + j] * force[0] + c[pm.RATE * LANE + j] * force[1]
+    drive = c[states] * i + c[states + 2 * LANE] * speed
+    angles = c[states + LANE] * wheel + c[states + 3 * LANE] * load
+    curve = c[pm.CURVE * LANE + j]
+    forced += curve * force[2] + c[pm.CONSTANT * LANE + j]
+    known = (drive + angles) + (c[states + 4 * LANE] * load_speed + forced)
+    return known + (c[pm.COMMAND * LANE + j] + curve * force[3]) * command
 
 
 @njit(error_model="numpy", forceinline=True)
-def _added(line, j, missing, slope):
+def _added(c, j, missing, slope):
     """What gravity's third and fourth derivative add to a state."""
-    return line[MISSING + j] * missing + line[SLOPE + j] * slope
+    return c[MISSING + j] * missing + c[SLOPE + j] * slope
 
 
 @njit(error_model="numpy", forceinline=True)
@@ -170,36 +170,36 @@ def sine_very_near(turned, gravity_sines):
 
 
 @njit(error_model="numpy", forceinline=True)
-def force_of(line, z, gravity_sines):
+def force_of(c, z, gravity_sines):
     """Gravity's torque and its first two derivatives; `gravity_sines` are times gravity.
 
-    The second is the third number plus the fourth times the command.
+    The second derivative is the third number plus the fourth times the command.
     """
     i, wheel, speed, load, load_speed = z
     sine, cosine = gravity_sines
     states = LOAD_SPEED_RATE + pm.STATES
-    drive = line[states] * i + line[states + 2] * speed
-    angles = line[states + 1] * wheel + line[states + 3] * load
-    rest = line[LOAD_SPEED_RATE + pm.CONSTANT] - line[LOAD_SPEED_RATE + pm.FORCE] * sine
-    known = (drive + angles) + (line[states + 4] * load_speed + rest)
+    drive = c[states] * i + c[states + 2] * speed
+    angles = c[states + 1] * wheel + c[states + 3] * load
+    rest = c[LOAD_SPEED_RATE + pm.CONSTANT] - c[LOAD_SPEED_RATE + pm.FORCE] * sine
+    known = (drive + angles) + (c[states + 4] * load_speed + rest)
     curve = sine * load_speed * load_speed - cosine * known
-    return -sine, -cosine * load_speed, curve, -cosine * line[LOAD_SPEED_RATE + pm.COMMAND]
+    return -sine, -cosine * load_speed, curve, -cosine * c[LOAD_SPEED_RATE + pm.COMMAND]
 
 
 @njit(error_model="numpy", forceinline=True)
-def moved(line, command, z, force):
+def moved(c, command, z, force):
     """The five states a row later, by gravity's first three terms."""
     return (
-        _sum(line, k.IM, command, z, force),
-        _sum(line, k.TW, command, z, force),
-        _sum(line, k.WW, command, z, force),
-        _sum(line, k.TL, command, z, force),
-        _sum(line, k.WL, command, z, force),
+        _sum(c, k.IM, command, z, force),
+        _sum(c, k.TW, command, z, force),
+        _sum(c, k.WW, command, z, force),
+        _sum(c, k.TL, command, z, force),
+        _sum(c, k.WL, command, z, force),
     )
 
 
 @njit(error_model="numpy", forceinline=True)
-def with_high_order(line, fixed, command, z, force, gravity_sines, fastest):
+def with_high_order(c, fixed, command, z, force, gravity_sines, fastest):
     """The states with gravity met at the row's end too, and whether that is enough."""
     i, wheel, speed, load, load_speed = z
     missing, slope = pm.missing_at_end(
@@ -207,40 +207,40 @@ def with_high_order(line, fixed, command, z, force, gravity_sines, fastest):
         -gravity_sines[1] * load_speed,
     )  # fmt: skip
     third, fourth = pm.high_derivatives(fixed.hermite, missing, slope)
-    missed = line[pm.THIRD * LANE + k.TL] * third * fixed.gravity
+    missed = c[pm.THIRD * LANE + k.TL] * third * fixed.gravity
     smooth = pm.is_smooth(
-        line[pm.THIRD * LANE + k.WL] * third, line[pm.FOURTH * LANE + k.WL] * fourth,
-        line[pm.FORCE * LANE + k.WL] * missed, fastest,
+        c[pm.THIRD * LANE + k.WL] * third, c[pm.FOURTH * LANE + k.WL] * fourth,
+        c[pm.FORCE * LANE + k.WL] * missed, fastest,
     )  # fmt: skip
     return smooth, (
-        i + _added(line, k.IM, missing, slope),
-        wheel + _added(line, k.TW, missing, slope),
-        speed + _added(line, k.WW, missing, slope),
-        load + _added(line, k.TL, missing, slope),
-        load_speed + _added(line, k.WL, missing, slope),
+        i + _added(c, k.IM, missing, slope),
+        wheel + _added(c, k.TW, missing, slope),
+        speed + _added(c, k.WW, missing, slope),
+        load + _added(c, k.TL, missing, slope),
+        load_speed + _added(c, k.WL, missing, slope),
     )
 
 
 @njit(error_model="numpy", forceinline=True)
-def first_change(line, row_s, command, z):
+def first_change(c, row_s, command, z):
     """What the current would change in a row at the slope with which it begins [A].
 
     The command jumps between rows: the current may rise first and fall then, which neither its
     change over this row nor the one before shows.
     """
     states = CURRENT_RATE + pm.STATES
-    drive = line[states] * z[0] + line[states + 2] * z[2]
-    given = line[CURRENT_RATE + pm.COMMAND] * command + line[CURRENT_RATE + pm.CONSTANT]
+    drive = c[states] * z[0] + c[states + 2] * z[2]
+    given = c[CURRENT_RATE + pm.COMMAND] * command + c[CURRENT_RATE + pm.CONSTANT]
     return row_s * abs(drive + given)
 
 
 @njit(error_model="numpy", forceinline=True)
-def stays(line, fx, fixed, now, command, z, z1, last):
+def stays(c, fx, fixed, now, command, z, z1, last):
     """Whether nothing came near a switch from z to z1; `last`: what changed in the row before."""
     i, wheel, speed, load, load_speed = z
     i1, wheel1, speed1, load1, load_speed1 = z1
     quarter = 0.25 * fixed.row_s
-    first_A = first_change(line, fixed.row_s, command, z)
+    first_A = first_change(c, fixed.row_s, command, z)
     rise_A = max(last[0], first_A)
     clear = max(abs(i), abs(i1)) + 0.25 * (abs(i1 - i) + rise_A) < fixed.limit_A
     clear = clear and now.wheel * speed1 >= 0.25 * abs(now.wheel) * (abs(speed1 - speed) + last[1])
