@@ -24,12 +24,12 @@ def diagnose(case: Path, out: Path, quick: bool) -> float:
         "--force",
         *(["--quick"] if quick else []),
     ]
-    subprocess.run([sys.executable, "-m", "dftfs.cli.main", *given_arguments], check=False)
+    subprocess.run([sys.executable, "-m", "dftfs", *given_arguments], check=False)
     took = time.perf_counter() - began
     if (out / "model.toml").exists() and (case / "test").is_dir():
         given_arguments = ["predict", str(out / "model.toml"), str(case / "test")]
         given_arguments += ["--out", str(out / "prediction.csv")]
-        subprocess.run([sys.executable, "-m", "dftfs.cli.main", *given_arguments], check=False)
+        subprocess.run([sys.executable, "-m", "dftfs", *given_arguments], check=False)
     return took
 
 

@@ -96,7 +96,8 @@ def judged(proposal: Proposal, raw: dict, truth: dict, rig: Rig) -> tuple[str, l
             faults.append(f"{label}: not recognised as {target}")
             silent += [] if asked else [label]
             continue
-        own, _ = factor_and_offset(c.unit, unit_of_column(c.target), c.counts_per_rev)
+        own, _ = factor_and_offset(c.unit, unit_of_column(c.target), c.counts_per_rev,
+                                  linear=rig.axis == "linear")  # fmt: skip
         if c.side is not None:
             own *= rig.gear_ratio if c.side == "load" else 1.0 / rig.gear_ratio
         ok = c.target == target and np.isclose(abs(own), abs(factor), rtol=1e-3)

@@ -50,7 +50,7 @@ def commands(room: Path) -> Mapping[str, list[str]]:
     sweep = ["--vary", "width_mm=5,6,7,8", "--states", "3", "--jobs", "2", "--cache", "cache"]
     make = ["prove", "make", "--seed", "7", "--cases", "2", "--levels", "plain", "--out", "set"]
     if not (room / "set").exists():
-        subprocess.run([sys.executable, "-m", "dftfs.cli.main", *make], cwd=room, check=True,
+        subprocess.run([sys.executable, "-m", "dftfs", *make], cwd=room, check=True,
                        capture_output=True)  # fmt: skip
     return {
         "export": ["export", "al1", "--out", "out", "--force"],
@@ -116,7 +116,7 @@ def _last_place(shown: bytes) -> str:
 
 def strike(arguments: list[str], room: Path, number: int, after_s: float) -> Counter:
     """Start a command, send it a signal after a time, and count what is wrong then."""
-    command = [sys.executable, "-m", "dftfs.cli.main", *arguments]
+    command = [sys.executable, "-m", "dftfs", *arguments]
     before = {path: path.stat().st_size for path in results(room)}
     process = subprocess.Popen(command, cwd=room, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     try:
@@ -160,7 +160,7 @@ def main() -> int:
             room.mkdir()
             arguments, total = commands(room)[name], Counter()
             begun = time.monotonic()
-            command = [sys.executable, "-m", "dftfs.cli.main", *arguments]
+            command = [sys.executable, "-m", "dftfs", *arguments]
             first = subprocess.run(command, cwd=room, capture_output=True)
             took = time.monotonic() - begun
             while total["tried"] < asked.faults / len(names) and total["finished"] < asked.faults:

@@ -39,7 +39,7 @@ def write_log(path: Path, r: Recording) -> None:
 def timed(folder: Path, *arguments: str) -> float:
     """Run a command in a folder, print it with its seconds and the end of what it says."""
     begun = time.perf_counter()
-    command = [sys.executable, "-m", "dftfs.cli.main", *arguments, "--quiet"]
+    command = [sys.executable, "-m", "dftfs", *arguments, "--quiet"]
     done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
     seconds = time.perf_counter() - begun
     printed = (done.stdout + done.stderr).strip().splitlines()

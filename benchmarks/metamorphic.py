@@ -122,7 +122,7 @@ FORMS: dict[str, Callable[[Path], None]] = {
 
 def verdict(case: Path, out: Path) -> tuple[str, tuple[str, ...]]:
     """Verdict and claims of `dftfs diagnose`, or its one line."""
-    command = [sys.executable, "-m", "dftfs.cli.main", "diagnose", str(case), "--out", str(out)]
+    command = [sys.executable, "-m", "dftfs", "diagnose", str(case), "--out", str(out)]
     done = subprocess.run(command, capture_output=True, text=True)
     if done.returncode:
         return (done.stderr.strip().splitlines() or ["no message"])[-1], ()

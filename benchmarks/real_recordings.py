@@ -26,7 +26,7 @@ PAGE = "real-recordings.md"
 def diagnose(case: Path, out: Path) -> tuple[float, float]:
     """Wall and processor seconds of `dftfs diagnose`."""
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-    given_arguments = [sys.executable, "-m", "dftfs.cli.main", "diagnose", str(case)]
+    given_arguments = [sys.executable, "-m", "dftfs", "diagnose", str(case)]
     subprocess.run(
         [*given_arguments, "--out", str(out), "--force"], check=True, stdout=subprocess.DEVNULL
     )

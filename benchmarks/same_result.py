@@ -52,7 +52,7 @@ def result(name: str, room: Path, threads: int, seed: int) -> tuple[int, object]
     (room / "c.toml").write_text(COMPARISON, encoding="utf-8")
     text = resources.files("dftfs").joinpath("examples", "torque-1hz.toml").read_text()
     (room / "s.toml").write_text(text.replace(SCENARIO, ""), encoding="utf-8")
-    program = [sys.executable, "-m", "dftfs.cli.main"]
+    program = [sys.executable, "-m", "dftfs"]
     if any(CASE in word for word in COMMANDS[name]):
         make = ["prove", "make", "--seed", "7", "--cases", "1", "--levels", "plain", "--out", "set"]
         subprocess.run([*program, *make], cwd=room, check=True, capture_output=True,

@@ -72,7 +72,7 @@ def _run_again(arguments: Sequence[str], folder: Path, room: Path) -> Path:
     if not folder.is_dir():
         raise DftfsError(f"{folder}: where the command ran, no longer exists")
     progress()(f"running dftfs {shlex.join(arguments)} in {folder}")
-    call = [sys.executable, "-m", "dftfs.cli.main", *elsewhere(arguments, room)]
+    call = [sys.executable, "-m", "dftfs", *elsewhere(arguments, room)]
     done = subprocess.run(call, cwd=folder, capture_output=True, text=True)
     if done.returncode not in (0, 1):
         reason = done.stderr.strip().rpartition("\n")[2]

@@ -34,6 +34,7 @@ def _recordings(arguments: argparse.Namespace) -> int:
     from rsea_core.importing.doctor.health import health
     from rsea_core.importing.doctor.slip_catalogue import case_slips, try_slips
     from rsea_core.recordings.case import read_case
+    from rsea_core.recordings.finding import grouped_sentences
     from rsea_core.recordings.quality_checks import data_warnings
 
     if arguments.out is not None:
@@ -41,7 +42,8 @@ def _recordings(arguments: argparse.Namespace) -> int:
         refuse_existing([page], force=arguments.force)
     case = read_case(arguments.case, progress())
     lines = [line for r in case.recordings for line in health(case.rig, r)]
-    notes = [f.sentence() for f in (*case.notes(), *data_warnings(case), *case_slips(case))]
+    findings = (*case.notes(), *data_warnings(case), *case_slips(case))
+    notes = grouped_sentences(findings)
     results = ()
     if not arguments.no_slips:
         progress()("forty slips on copies of the first recordings")

@@ -10,13 +10,16 @@ from dftfs.files import OutputError, write_text
 from dftfs.report.page_data import write_page
 from dftfs.report.provenance import case_provenance
 from rsea_core.errors import RecordingError, RigError, RseaError
+from rsea_core.importing.case_maker import usual_load
 from rsea_core.importing.case_text import NEEDED, ListedRecording, missing_values, parts_of
 from rsea_core.importing.doctor.slip_catalogue import case_slips
 from rsea_core.importing.proposal import Proposal
 from rsea_core.importing.rest import is_held, starts_in_motion
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, read_case
+from rsea_core.recordings.finding import grouped_sentences
 from rsea_core.recordings.quality_checks import data_warnings
+from rsea_core.recordings.recording import Recording
 
 RIG, PREVIEW = "rig.toml", "preview.html"
 
@@ -59,7 +62,7 @@ def read_with_starts(
     text_of : callable
         The rig file of such a sequence.
     guess_load : bool
-        A load that hardly moves was held.
+        A load that hardly moves was held, and one that moves was not.
     """
     text = text_of(listed)
     case, problem = read_back(out, text)
@@ -67,14 +70,22 @@ def read_with_starts(
         return text, case, problem
     others = case.recordings[: -len(listed)]
     own = case.recordings[-len(listed) :]
-    if guess_load and any(is_held(case.rig, r) for r in own):
-        loads = ["locked" if is_held(case.rig, r) else r.load.kind for r in own]
+    loads = [_load_of(case.rig, r) for r in own]
+    if guess_load and loads != [r.load.kind for r in own]:
         listed = [replace(x, load=load) for x, load in zip(listed, loads)]
         return read_with_starts(out, listed, text_of)
     rest = [r.initial_rest and not starts_in_motion(case.rig, r) for r in own]
     text = text_of([replace(x, initial_rest=at_rest) for x, at_rest in zip(listed, rest)])
     own = tuple(replace(r, initial_rest=at_rest) for r, at_rest in zip(own, rest))
     return text, replace(case, recordings=(*others, *own)), None
+
+
+def _load_of(rig: Rig, r: Recording) -> str:
+    """The load of a recording as its angles show it, as it is listed where they do not."""
+    if is_held(rig, r):
+        return "locked"
+    both = {"motor_angle_rad", "load_angle_rad"} <= set(r.columns)
+    return usual_load(rig) if both and r.load.kind == "locked" else r.load.kind
 
 
 def write_case(
@@ -90,7 +101,7 @@ def write_case(
     notes = []
     if case is not None:
         found = (*case.notes(), *data_warnings(case), *case_slips(case))
-        notes = list(dict.fromkeys(f.sentence() for f in found))
+        notes = list(dict.fromkeys(grouped_sentences(found)))
     rows = [
         (c.target, c.name, f"{'-' if c.sign < 0 else ''}{c.unit}", f"{c.confidence:.0%}", c.reason)
         for c in proposal.columns
@@ -106,7 +117,8 @@ def write_case(
     write_text(out / RIG, text)
     missing = missing_values(rig, parts_of([c.target for c in proposal.columns]))
     lines = [table(header, rows)]
-    lines += [f"taken without asking: {q}" for q in proposal.questions]
+    state = "taken without asking" if rig is not None else "not decided yet"
+    lines += [f"{state}: {q}" for q in proposal.questions]
     if proposal.references:
         lines.append(f"reference, not fitted: {', '.join(proposal.references)}")
     notes = [*proposal.notes, *notes]

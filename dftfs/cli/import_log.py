@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
-from dftfs.cli.import_values import known_values, some_of, window_of
+from dftfs.cli.import_values import known_values, print_questions, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError
@@ -15,6 +15,7 @@ from rsea_core.files.toml_tables import read_toml
 from rsea_core.importing.case_maker import (
     ImportOptions,
     case_text,
+    common_load,
     completed,
     decided,
     file_entry,
@@ -77,10 +78,11 @@ def run(arguments: argparse.Namespace) -> int:
     columns = labelled_columns(groups[0], options)
     can_ask = sys.stdin.isatty() and not arguments.yes
     proposal = decided(columns, rig, options, arguments.logs[0], _ask if can_ask else None)
-    if proposal.questions and not (can_ask or arguments.yes):
+    if proposal.questions and rig is not None and not (can_ask or arguments.yes):
+        print_questions(proposal.questions)
         raise DftfsError(
-            f"{len(proposal.questions)} questions: {some_of(proposal.questions)} Answer with"
-            " --column, or accept the proposals with --yes"
+            f"{len(proposal.questions)} questions: answer each with --column, or accept the"
+            " proposals with --yes; nothing was written"
         )
     proposal = replace(proposal, notes=(*proposal.notes, *unread_text(groups[0])))
     listed = [r for group in groups for r in listed_recordings(group, proposal, rig, options)]
@@ -106,9 +108,11 @@ def _rig(given: str | None) -> Rig | None:
 def _add_to_case(groups, options: ImportOptions) -> int:
     """Further logs for a case that has its map already: listed, read back, nothing asked."""
     path = options.out / RIG
-    if "columns" not in read_toml(path, RigError):
+    tables = read_toml(path, RigError)
+    if "columns" not in tables:
         raise DftfsError(f"{path} exists without [columns]; import into another folder")
-    listed = [r for g in groups for r in windows_of(file_entry(g, options), options)]
+    before = replace(options, load=options.load or common_load(tables))
+    listed = [r for g in groups for r in windows_of(file_entry(g, before), options)]
     head = path.read_text(encoding="utf-8").rstrip() + "\n\n"
     text, case, problem = read_with_starts(
         options.out,

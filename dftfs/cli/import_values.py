@@ -1,5 +1,6 @@
-"""What the user states to `dftfs import`: windows, known parts; questions in a line."""
+"""What the user states to `dftfs import`: windows, known parts; its questions."""
 
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,11 +11,13 @@ from rsea_core.recordings.recording import ROLES
 MOST_ASKED = 8
 
 
-def some_of(questions: Sequence[str]) -> str:
-    """The first questions; a log of a hundred unknown columns has a hundred of them."""
-    left = len(questions) - MOST_ASKED
-    more = f" | and {left} more (--json --yes lists them)" if left > 0 else ""
-    return " | ".join(questions[:MOST_ASKED]) + more
+def print_questions(questions: Sequence[str]) -> None:
+    """The first questions, a line each: of a log of a hundred unknown columns, a hundred."""
+    for question in questions[:MOST_ASKED]:
+        print(f"question: {question}", file=sys.stderr)
+    if len(questions) > MOST_ASKED:
+        more = len(questions) - MOST_ASKED
+        print(f"question: and {more} more (--json --yes lists them)", file=sys.stderr)
 
 
 def window_of(text: str) -> tuple[float, float, str | None]:

@@ -92,7 +92,3 @@ def program() -> int:
     status = main()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     return status
-
-
-if __name__ == "__main__":
-    sys.exit(program())

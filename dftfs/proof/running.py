@@ -32,10 +32,8 @@ from dftfs.proof.labels import check_seal
 from dftfs.proof.writing import CASES
 from dftfs.staging import staging_folder, sweep_stale
 
-DIAGNOSE = "{python} -m dftfs.cli.main diagnose {case} --out {out}"
-PREDICT = (
-    "{python} -m dftfs.cli.main predict {out}/model.toml {case}/test --out {out}/prediction.csv"
-)
+DIAGNOSE = "{python} -m dftfs diagnose {case} --out {out}"
+PREDICT = "{python} -m dftfs predict {out}/model.toml {case}/test --out {out}/prediction.csv"
 RUN, OUTCOME = "run.json", "outcome.json"
 # by a signal, or by the exit status of a program that handles one
 INTERRUPTED = {-signal.SIGHUP, -signal.SIGINT, -signal.SIGTERM, 129, 130, 143}

@@ -1,13 +1,16 @@
 """What the owner states about a column: `NAME=COLUMN:UNIT[:SIGN]`, or a table as in the map."""
 
+import json
 import re
+import shlex
 import tomllib
 from collections.abc import Collection
 from dataclasses import dataclass
 
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest
-from rsea_core.recordings.column_map import ColumnSource, column_map
+from rsea_core.machine.rig import Rig
+from rsea_core.recordings.column_map import ColumnSource, column_map, for_rig
 from rsea_core.recordings.recording import COLUMNS
 from rsea_core.recordings.units import factor_and_offset, unit_of_column
 
@@ -31,13 +34,15 @@ class Answer:
     name: str
 
 
-def parse_answer(text: str, known: Collection[str]) -> Answer:
+def parse_answer(text: str, known: Collection[str], rig: Rig | None = None) -> Answer:
     """A statement of the command line.
 
     Parameters
     ----------
     known : collection of str
         The log's columns.
+    rig : Rig or None
+        What knows the counts of encoders, and whether the axis is linear.
 
     Raises
     ------
@@ -50,12 +55,25 @@ def parse_answer(text: str, known: Collection[str]) -> Answer:
         raise RecordingError(f"answer {text!r}: write {FORM}{near}")
     if target == REFERENCE:
         return Answer(source=None, name=_known(value, known, text))
-    source = _source(target, value, text, known)
+    source = _source(target, value, text, known, rig)
     if source.formula is None:
         _known(source.name, known, text)
     if source.unit is not None:
-        factor_and_offset(source.unit, unit_of_column(target), source.counts_per_rev or 1.0)
+        linear, counts = rig is not None and rig.axis == "linear", source.counts_per_rev or 1.0
+        factor_and_offset(source.unit, unit_of_column(target), counts, linear=linear)
     return Answer(source=source, name=source.name)
+
+
+def answer_text(
+    target: str, name: str, unit: str, *, sign: int = 1, side: str | None = None, scale: float = 1.0
+) -> str:
+    """A statement as it is typed on the command line."""
+    if side is None and scale == 1.0:
+        return f"--column {shlex.quote(f'{target}={name}:{unit}' + (':-1' if sign < 0 else ''))}"
+    more = f', side = "{side}"' if side is not None else ""
+    more += f", scale = {scale:.4g}" if scale != 1.0 else ""
+    more += ", sign = -1" if sign < 0 else ""
+    return f"--column '{target}={{ name = {json.dumps(name)}, unit = \"{unit}\"{more} }}'"
 
 
 def quoted(formula: str) -> list[str]:
@@ -63,7 +81,9 @@ def quoted(formula: str) -> list[str]:
     return [a or b for a, b in re.findall(r"'([^']*)'|\"([^\"]*)\"", formula)]
 
 
-def _source(target: str, value: str, text: str, known: Collection[str]) -> ColumnSource:
+def _source(
+    target: str, value: str, text: str, known: Collection[str], rig: Rig | None
+) -> ColumnSource:
     if value.startswith("{"):
         try:
             entry: object = tomllib.loads(f"entry = {value}")["entry"]
@@ -71,7 +91,8 @@ def _source(target: str, value: str, text: str, known: Collection[str]) -> Colum
             raise RecordingError(f"answer {text!r}: is no table of TOML: {problem}") from problem
     else:
         entry = _short(value, known)
-    return column_map({target: entry}, COLUMNS, f"answer {text!r}").sources[0]
+    columns = column_map({target: entry}, COLUMNS, f"answer {text!r}")
+    return (columns if rig is None else for_rig(columns, rig)).sources[0]
 
 
 def _short(value: str, known: Collection[str]) -> dict[str, object]:

@@ -98,6 +98,9 @@ def _targets(name: str, e: NameEvidence, rig: Rig | None, is_servo: bool) -> lis
         if rig is not None and not is_servo:
             owns = {"motor": rig.has("gear") or rig.has("drive"), "load": rig.has("load")}
             sides = [s for s in sides if owns[s]] or sides
+            if len(sides) == 2 and rig.gear_ratio == 1.0 and not rig.has("spring"):
+                counted = rig.load_encoder_counts_per_rev and not rig.motor_encoder_counts_per_rev
+                sides = ["load" if counted else "motor"]  # one body
         return [f"{side}_{SIDED[e.quantity]}" for side in sides]
     if e.quantity == "torque" and (e.side == "motor" and not is_servo):
         return ["motor_torque_Nm"]

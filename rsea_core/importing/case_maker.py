@@ -117,7 +117,7 @@ def decided(
         If nothing is recognised, the log has no time, or an answer cannot be used.
     """
     raw = {n: c.values for n, c in columns.items()}
-    answers = [parse_answer(text, raw) for text in options.answers]
+    answers = [parse_answer(text, raw, rig) for text in options.answers]
     parts = {n for a in answers if a.source and a.source.formula for n in quoted(a.source.formula)}
     stated = {**dict.fromkeys(parts & set(raw)), **{a.name: a.source for a in answers if a.name}}
     if options.split in raw:
@@ -133,7 +133,10 @@ def decided(
         raise RecordingError(f"{path}: {problem}") from problem
     if proposal.rate_needed:
         why = why_no_time(raw, units)
-        raise RecordingError(f"{path}: {why}; say how fast it was logged with --rate-hz")
+        raise RecordingError(
+            f"{path}: {why}; name it, as --column time_s=COLUMN:ms, or say how fast it was logged"
+            " with --rate-hz"
+        )
     proposal = _with_wraps(proposal, wraps)
     kept = tuple(n for n in proposal.references if n not in parts)
     proposal = replace(proposal, references=kept)
@@ -142,7 +145,7 @@ def decided(
         proposal = answered(proposal, answer)
     for question in proposal.questions if ask is not None else ():
         reply = ask(question).strip()
-        proposal = answered(proposal, parse_answer(reply, raw)) if reply else proposal
+        proposal = answered(proposal, parse_answer(reply, raw, rig)) if reply else proposal
     return proposal
 
 
@@ -224,14 +227,28 @@ def _load(raw: Mapping[str, NDArray], proposal: Proposal, rig: Rig | None) -> st
     """How the load was held, from what moves."""
     motor, load = (proposal.column(f"{s}_angle_rad") for s in ("motor", "load"))
     if motor is None or load is None or rig is None:
-        return "pendulum"
+        return usual_load(rig)
     spans = [
-        factor_and_offset(c.unit, "rad", c.counts_per_rev)[0]
+        factor_and_offset(c.unit, "rad", c.counts_per_rev, linear=rig.axis == "linear")[0]
         * float(np.ptp(raw[c.name] if c.wrap is None else unwrapped(raw[c.name], c.wrap)))
         for c in (motor, load)
     ]
     behind = spans[0] / (1.0 if motor.side == "load" else rig.gear_ratio or 1.0)
-    return "locked" if spans[1] < HELD_SPAN * behind else "pendulum"
+    return "locked" if spans[1] < HELD_SPAN * behind else usual_load(rig)
+
+
+def usual_load(rig: Rig | None) -> str:
+    """The load of a recording that says nothing of it."""
+    if rig is None or (rig.axis == "rotary" and rig.has("load")):
+        return "pendulum"
+    return "free" if rig.has("load") else "locked"
+
+
+def common_load(tables: Mapping) -> str | None:
+    """The load of all recordings of a rig file; None where they differ."""
+    listed = tables.get("recording")
+    loads = {r.get("load") for r in listed} if isinstance(listed, list) else set()
+    return loads.pop() if len(loads) == 1 else None
 
 
 def completed(rig: Rig | None, known: Mapping[str, tuple[float, str]]) -> Rig | None:

@@ -13,8 +13,10 @@ from rsea_core.importing.unit_evidence import (
     FOLLOWS,
     Law,
     correlation_of,
+    current_laws,
     derivative_laws,
     gear_laws,
+    motion_laws,
     sensor_laws,
     servo_laws,
     spring_laws,
@@ -22,6 +24,7 @@ from rsea_core.importing.unit_evidence import (
 )
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
+from rsea_core.recordings.column_map import counts_of
 from rsea_core.recordings.units import factor_and_offset, unit_of_column
 
 UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
@@ -31,13 +34,20 @@ UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "velocity": (("rad/s", 0.0), ("deg/s", -0.7), ("rpm", -0.7), ("turn/s", -2.0)),
     "current": (("A", 0.0), ("mA", -0.7)),
     "torque": (("N*m", 0.0), ("mN*m", -1.0), ("N*cm", -3.0)),
-    "duty": (("dimensionless", 0.0), ("percent", -0.5)),
+    "duty": (("dimensionless", 0.0), ("percent", -0.5), ("permille", -4.0)),
     "voltage": (("V", 0.0), ("mV", -1.0)),
     "supply": (("V", 0.0), ("mV", -1.0)),
     "temperature": (("degC", 0.0),),
     "enabled": (("dimensionless", 0.0),),
 }
 """Units of each quantity with the logarithm of how usual they are."""
+LINEAR: Mapping[str, tuple[tuple[str, float], ...]] = {
+    "angle": (("m", 0.0), ("mm", -0.3), ("um", -1.5)),
+    "deflection": (("m", 0.0), ("mm", -0.3)),
+    "velocity": (("m/s", 0.0), ("mm/s", -0.7)),
+    "torque": (("N", 0.0), ("kN", -3.0)),
+}
+"""The same of a linear axis, for columns that are not the motor's."""
 STATED = -15.0  # a unit other than the one that a name or a file states
 OTHER_SIDE = -2.0  # an angle that was measured on the other side of the gear than it is named for
 ODD, IMPOSSIBLE = -4.0, -25.0
@@ -85,8 +95,13 @@ class Posterior:
 def choices_of(name: str, target: str, evidence: NameEvidence, raw: NDArray, rig: Rig | None):
     """Every unit and side that a column of a target may have."""
     quantity = quantity_of(target)
-    known = {unit for unit, _ in UNITS[quantity]}
+    linear = rig is not None and rig.axis == "linear"
     options = list(UNITS[quantity])
+    if linear and not (target.startswith("motor") and (rig.gear_ratio or 1.0) != 1.0):
+        options = list(LINEAR.get(quantity, options))
+        if quantity == "angle" and counts_of(rig, target, None):
+            options.append(("count", -1.0))
+    known = {unit for unit, _ in options}
     stated = evidence.unit
     if stated is not None and stated not in known:
         options.append((stated, 0.0))
@@ -94,7 +109,7 @@ def choices_of(name: str, target: str, evidence: NameEvidence, raw: NDArray, rig
     found = []
     for unit, prior in options:
         if stated is not None:
-            prior = 0.0 if _same(unit, stated, target) else STATED
+            prior = 0.0 if _same(unit, stated, target, linear) else STATED
         elif unit == "count":
             prior = 0.5 if whole and np.ptp(raw) > 20.0 else -12.0
         elif quantity == "angle" and whole and np.ptp(raw) > 100.0:
@@ -114,10 +129,10 @@ def quantity_of(target: str) -> str:
     raise ValueError(target)
 
 
-def _same(unit: str, stated: str, target: str) -> bool:
+def _same(unit: str, stated: str, target: str, linear: bool) -> bool:
     try:
-        own = factor_and_offset(unit, unit_of_column(target), 1.0)
-        other = factor_and_offset(stated, unit_of_column(target), 1.0)
+        own = factor_and_offset(unit, unit_of_column(target), 1.0, linear=linear)
+        other = factor_and_offset(stated, unit_of_column(target), 1.0, linear=linear)
     except Exception:  # a unit that is none: never the stated one
         return unit == stated
     return bool(np.isclose(own[0], other[0], rtol=1e-9))
@@ -132,7 +147,8 @@ def _sided(name, target, unit, prior, rig: Rig | None, raw) -> list[Choice]:
     for side in sides:
         for counts in _counts(target, side, rig) if unit == "count" else (None,):
             try:
-                factor, _ = factor_and_offset(unit, unit_of_column(target), counts)
+                linear = rig is not None and rig.axis == "linear"
+                factor, _ = factor_and_offset(unit, unit_of_column(target), counts, linear=linear)
             except Exception:  # a stated unit that does not fit this target
                 continue
             if side is not None:
@@ -147,8 +163,7 @@ def _sided(name, target, unit, prior, rig: Rig | None, raw) -> list[Choice]:
 
 
 def _counts(target: str, side: str | None, rig: Rig | None) -> Sequence[float]:
-    own = "load" if target == POSITION_COMMAND else side or target.split("_")[0]
-    known = None if rig is None else getattr(rig, f"{own}_encoder_counts_per_rev", None)
+    known = None if rig is None else counts_of(rig, target, side)
     return (known,) if known else COUNTS[:2]
 
 
@@ -253,7 +268,11 @@ class _Laws:
         self.short = {name: v[:: self.stride] for name, v in self.raw.items()}
         self.found: dict[tuple, list[Law]] = {}
         rig_laws = [] if rig is None else [
-            (winding_laws, ("time_s", "duty", "voltage_V", "current_A", "motor_angle_rad")),
+            (winding_laws, ("time_s", "duty", "voltage_V", "current_A", "motor_angle_rad",
+                            "motor_velocity_rad_per_s", "load_angle_rad",
+                            "load_velocity_rad_per_s")),
+            (motion_laws, ("time_s", "current_command_A", "duty", "voltage_V", "motor_angle_rad",
+                           "load_angle_rad")),
             (spring_laws, ("time_s", "motor_angle_rad", "load_angle_rad", "torque_Nm",
                            "spring_deflection_rad")),
         ]  # fmt: skip
@@ -261,6 +280,7 @@ class _Laws:
             (derivative_laws, ("time_s", "motor_angle_rad", "motor_velocity_rad_per_s")),
             (derivative_laws, ("time_s", "load_angle_rad", "load_velocity_rad_per_s")),
             (gear_laws, ("time_s", "motor_angle_rad", "load_angle_rad")),
+            (current_laws, ("time_s", "current_command_A", "current_A")),
             (servo_laws, ("time_s", POSITION_COMMAND, "motor_angle_rad", "load_angle_rad")),
             *rig_laws,
         ]

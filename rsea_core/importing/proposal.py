@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
-from rsea_core.importing.answers import Answer
+from rsea_core.importing.answers import Answer, answer_text
 from rsea_core.importing.assignment import (
     alternatives,
     columns_by_derivative,
@@ -29,9 +29,10 @@ from rsea_core.recordings.readers.log import LOG_TIME
 from rsea_core.recordings.units import unit_of_column
 
 ASK_BELOW = 0.9
-BROKEN = -4.5  # three standard deviations of a law
+BROKEN, BROKEN_ALONE = 2.5, 4.0  # standard deviations of a law, of one of a single reading
 SOURCES = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A")
 EXACTLY = 1e-4  # of its scatter: no sensor follows an angle as closely
+STAMPS = ("ts", "tstamp", "t_stamp")  # a time where it rises evenly, a spring's torque elsewhere
 COMPUTED = "computed, no sensor measured it; kept as a reference"
 
 
@@ -118,12 +119,16 @@ def propose(
     """
     stated = stated or {}
     own_units = {n: s.unit for n, s in stated.items() if s is not None and s.unit}
-    evidence = {name: name_evidence(name, own_units.get(name, units.get(name))) for name in raw}
+    linear = rig is not None and rig.axis == "linear"
+    evidence = {
+        name: name_evidence(name, own_units.get(name, units.get(name)), linear=linear)
+        for name in raw
+    }
     whole = {n: v for n, v in raw.items() if np.all(np.isfinite(v))}
     time = _time_column(whole, evidence, stated)
     if time is None:
         return Proposal(columns=(), references=(), ignored=(), questions=(), rate_needed=True)
-    others = [n for n in whole if n != time]
+    others = [n for n in whole if n != time and (n in stated or not _counts_rows(whole[n]))]
     assigned, goals, unknown = columns_by_name(others, evidence, rig, stated)
     if not assigned:
         assigned = columns_by_derivative(whole, time, rig)
@@ -135,6 +140,9 @@ def propose(
         found = choices_of(name, target, evidence[name], whole[name], rig)
         return _as_stated(found, stated.get(name))
 
+    foreign = [n for n in assigned if not any(choices(n, t) for t in assigned[n])]
+    assigned = {n: targets for n, targets in assigned.items() if n not in foreign}
+    unknown += foreign  # their units are of no reading
     tables = [{time: "time_s", **targets} for targets in alternatives(assigned)]
     assignments = [{n: choices(n, t) for n, t in table.items()} for table in tables]
     best = best_hypothesis(rig, whole, [a for a in assignments if all(a.values())])
@@ -145,7 +153,9 @@ def propose(
     columns = tuple(c for c in _with_signs(best, whole, rig, evidence) if c.name not in made)
     moving = [n for n in unknown if np.ptp(whole[n]) > 0.0 and not _counts_rows(whole[n])]
     questions = [_question(c, best) for c in columns if c.asks] + [
-        f"column {n!r}: what is it? Its name says nothing that is known" for n in moving
+        f"column {n!r}: what is it? Its name says nothing that is known: --column NAME={n}:UNIT,"
+        f" or reference={n} if it is not to be fitted"
+        for n in moving
     ]
     return Proposal(
         columns=columns,
@@ -170,6 +180,7 @@ def _time_column(
         return (stamps or named)[0]
     even = [n for n in rising if np.std(np.diff(raw[n])) < 0.2 * np.mean(np.diff(raw[n]))]
     free = [n for n in even if evidence[n].quantity is None and not _counts_rows(raw[n])]
+    free += [n for n in even if n.lower() in STAMPS]
     first = next(iter(raw), None)
     return free[0] if free and free[0] == first else None
 
@@ -244,7 +255,10 @@ def _with_signs(
 
 def _broken_law(target: str, best: Posterior) -> Law | None:
     """The law by which a reading agrees in no unit with the others that it is tied to."""
-    broken = [law for law in best.laws if law.size_score() < BROKEN]
+    broken = []
+    for law in best.laws:
+        most = BROKEN if len(law.columns) > 1 else BROKEN_ALONE
+        broken += [law] if law.size_score() - law.held < -0.5 * most**2 else []
     return next((x for x in broken if target == [n for n in x.columns if n != "time_s"][-1]), None)
 
 
@@ -275,15 +289,24 @@ def _reason(c: Choice, best: Posterior, e: NameEvidence, sign_known: bool) -> st
 
 
 def _question(c: ProposedColumn, best: Posterior) -> str:
+    """What is not decided of a column, with the answers as they are typed."""
     rival = best.rivals.get(c.name)
     broken = _broken_law(c.target, best)
+    own = answer_text(c.target, c.name, c.unit, sign=c.sign, side=c.side)
     if broken is not None:
-        return f"column {c.name!r}: {c.target}? In no unit: {broken.text}; state its scale"
+        scale = float(f"{broken.missing_scale:.3g}")
+        fits = answer_text(c.target, c.name, c.unit, sign=c.sign, side=c.side, scale=scale)
+        return f"column {c.name!r}: {c.target}? In no unit: {broken.text}; state its scale: {fits}"
     text = f"column {c.name!r}: {c.target} in {c.unit} ({c.confidence:.0%})"
-    if rival is not None and (rival.unit, rival.target, rival.side) != (c.unit, c.target, c.side):
+    differs = rival and (rival.unit, rival.target, rival.side) != (c.unit, c.target, c.side)
+    if differs and best.confidence[c.name] < ASK_BELOW:
         side = "" if rival.side is None else f" on the {rival.side} side"
-        return f"{text} or {rival.target} in {rival.unit}{side}?"
-    return f"{text}: its sign cannot be determined; is + the motor's + direction?"
+        other = answer_text(rival.target, c.name, rival.unit, sign=c.sign, side=rival.side)
+        return f"{text} or {rival.target} in {rival.unit}{side}? {own}, or {other}"
+    return (
+        f"{text}: its sign cannot be determined; is + the motor's + direction?"
+        f" {own}, or with sign {-c.sign:+d}"
+    )
 
 
 def answered(proposal: Proposal, answer: Answer) -> Proposal:

@@ -28,6 +28,8 @@ def with_rest_as_zero(proposal: Proposal, raw: Mapping[str, NDArray], rig: Rig |
     column = proposal.column("load_angle_rad")
     if rig is None or rig.parts != ("load",) or not rig.load_mass_kg or column is None:
         return proposal
+    if rig.axis == "linear":
+        return proposal
     factor, _ = factor_and_offset(column.unit, "rad", column.counts_per_rev or 1.0)
     angle = factor * raw[column.name]
     end = float(np.mean(angle[-max(3, round(LAST * angle.size)) :]))

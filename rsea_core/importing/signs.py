@@ -32,8 +32,9 @@ def signs_of(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: R
     command = next((n for n in ("duty", "voltage_V", "current_command_A") if n in data), None)
     if command is not None and angle is not None:
         signs[command], seen[command] = _command_sign(data[command], angle, time)
-        for law in laws:  # the winding's laws see signs without being misled by inertia
-            if law.columns[:2] == (command, "motor_angle_rad"):
+        moving = ("motor_angle_rad",) if motor is not None else ("load_angle_rad",)
+        for law in laws:  # laws of motion and winding see signs without being misled by inertia
+            if law.columns[0] == command and law.columns[1] in moving:
                 signs[command], seen[command] = int(np.sign(law.ratio)) or 1, True
         if "current_A" in data:
             signs["current_A"], seen["current_A"] = _current_sign(
@@ -42,7 +43,8 @@ def signs_of(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: R
             for law in laws:
                 if law.columns == (command, "current_A"):
                     turned = int(np.sign(law.ratio)) * signs[command]
-                    signs["current_A"], seen["current_A"] = turned or 1, True
+                    known = command != "current_command_A" or seen[command]
+                    signs["current_A"], seen["current_A"] = turned or 1, known
     if POSITION_COMMAND in data and angle is not None:
         signs[POSITION_COMMAND], seen[POSITION_COMMAND] = _sign_of(
             angle, data[POSITION_COMMAND], time
@@ -50,7 +52,16 @@ def signs_of(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: R
     if "torque_Nm" in data and motor is not None:
         deflection = motor / ratio - (0.0 if load is None else load)
         signs["torque_Nm"], seen["torque_Nm"] = _sign_of(deflection, data["torque_Nm"], time)
-    return signs, seen
+    return _with_fewest_turned(signs, by_target), seen
+
+
+def _with_fewest_turned(signs: dict[str, int], by_target: Mapping[str, Choice]) -> dict[str, int]:
+    """The signs, or all turned where fewer columns are: the machine's + direction is free."""
+    signed = [t for t in by_target if t in signs or t.endswith(("angle_rad", "rad_per_s"))]
+    turned = [t for t in signed if signs.get(t, 1) < 0]
+    if 2 * len(turned) <= len(signed):
+        return signs
+    return {t: -signs.get(t, 1) for t in signed}
 
 
 def _slow(values: NDArray, time: NDArray) -> NDArray:

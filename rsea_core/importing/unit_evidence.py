@@ -17,6 +17,7 @@ from rsea_core.machine.rig import Rig
 
 WINDING_TOLERANCE, GEAR_TOLERANCE, SPRING_TOLERANCE = 0.30, 0.12, 0.30
 DERIVATIVE_TOLERANCE, COUNT_TOLERANCE, NOISE_TOLERANCE = 0.08, 0.01, 0.45
+MOTION_TOLERANCE, HELD = 0.5, 4.0
 WORST = 30.0  # what one law can hold against a hypothesis, in log-likelihood units
 TOGETHER = 0.8
 FOLLOWS = 0.95  # correlation of a load that follows its motor
@@ -39,12 +40,24 @@ class Law:
         Standard deviation of its logarithm.
     columns : tuple of str
         The readings that it ties.
+    held : float
+        Log-likelihood units for a law that holds in few units of its columns, in others not
+        at all: without a relation between its columns there is nothing to compare.
+    inverse : bool
+        Whether the scale found falls as the last reading grows.
     """
 
     text: str
     ratio: float
     tolerance: float
     columns: tuple[str, ...]
+    held: float = 0.0
+    inverse: bool = False
+
+    @property
+    def missing_scale(self) -> float:
+        """Factor on the last reading that makes the scale 1."""
+        return abs(self.ratio) if self.inverse else 1.0 / max(abs(self.ratio), 1e-300)
 
     def score(self) -> float:
         """Log-likelihood of the scale, never below -`WORST`; a wrong sign is the worst."""
@@ -57,7 +70,7 @@ class Law:
         size = abs(self.ratio)
         if not size > 0.0 or not np.isfinite(size):
             return -WORST
-        return -min(0.5 * (np.log(size) / self.tolerance) ** 2, WORST)
+        return self.held - min(0.5 * (np.log(size) / self.tolerance) ** 2, WORST)
 
 
 def step_of(values: NDArray) -> float | None:
@@ -156,6 +169,18 @@ def servo_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> list[
     ]
 
 
+def current_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
+    """The current against the one that is commanded."""
+    names = ("current_command_A", "current_A")
+    if not all(n in c for n in names):
+        return []
+    slope, together = _together(*(_slow(c[n], _window(c["time_s"]) // 4 + 1) for n in names))
+    if abs(together) < TOGETHER:
+        return []
+    text = f"current_A is {slope:.3g} times current_command_A"
+    return [Law(text=text, ratio=slope, tolerance=GEAR_TOLERANCE, columns=names)]
+
+
 def volts_of(rig: Rig, c: Mapping[str, NDArray]) -> tuple[str, NDArray] | None:
     """The column that puts volts on the winding, and these."""
     if "voltage_V" in c:
@@ -168,13 +193,17 @@ def volts_of(rig: Rig, c: Mapping[str, NDArray]) -> tuple[str, NDArray] | None:
 def winding_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
     """R and k_e as the columns have them, by least squares, where the fit is good."""
     volts, R, k_e = volts_of(rig, c), rig.terminal_resistance_ohm, rig.back_emf_constant_Vs_per_rad
-    if volts is None or not (R and k_e and "current_A" in c and "motor_angle_rad" in c):
+    sides = ("motor",) if rig.has("spring") else ("motor", "load")
+    motions = [f"{side}_{kind}" for side in sides for kind in ("angle_rad", "velocity_rad_per_s")]
+    motion = next((n for n in motions if n in c), None)
+    if volts is None or not (R and k_e and "current_A" in c and motion):
         return []
     n = _window(c["time_s"])
     n = max(2, n // 4)
-    speed = (c["motor_angle_rad"][n:] - c["motor_angle_rad"][:-n]) / np.maximum(
-        c["time_s"][n:] - c["time_s"][:-n], 1e-12
-    )
+    moved = c[motion] * (ratio if motion.startswith("load") else 1.0)
+    speed = _means(moved, n)
+    if motion.endswith("angle_rad"):
+        speed = (moved[n:] - moved[:-n]) / np.maximum(c["time_s"][n:] - c["time_s"][:-n], 1e-12)
     A = np.stack([_means(c["current_A"], n), speed], axis=1)
     v = _means(volts[1], n)
     scale = np.std(A, axis=0)
@@ -187,15 +216,84 @@ def winding_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
     left = float(np.mean((v - B @ x) ** 2) / np.mean(v**2))
     share = np.abs(x) * np.std(B, axis=0) / np.std(v)
     found, values = [], x / scale
-    expected = ((R, "R", "current_A"), (k_e, "k_e", "motor_angle_rad"))
+    expected = ((R, "R", "current_A"), (k_e, "k_e", motion))
     for k, (value, symbol, name) in enumerate(expected):
         if left < 0.15 and share[k] > 0.15 + np.sqrt(left):
             text = f"the winding shows {symbol} {values[k] / value:.3g} times rig.toml's"
             names = (volts[0], name) if k == 0 else (volts[0], name, "time_s")
             tolerance = WINDING_TOLERANCE + np.sqrt(left)
             found.append(Law(text=text, ratio=float(values[k] / value), tolerance=tolerance,
-                             columns=names))  # fmt: skip
+                             columns=names, inverse=True))  # fmt: skip
     return found
+
+
+def motion_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
+    """The torque of the command against what inertia, gravity, spring and back-EMF need of it.
+
+    Second differences over rows are accelerations in a triangular window: everything else is
+    averaged in the same one.
+    """
+    names = [n for n in ("motor_angle_rad", "load_angle_rad") if n in c]
+    given = _driving_torque(rig, c, ratio)
+    if not names or given is None:
+        return []
+    output = c[names[0]] / (ratio if names[0] == "motor_angle_rad" else 1.0)
+    inertia, static = _resisting(rig, c, output, ratio)
+    command, torque, damping = given
+    if inertia <= 0.0:
+        return []
+    n = max(2, _window(c["time_s"]) // 2)
+    span = n * max(float(np.median(np.diff(c["time_s"]))), 1e-12)
+    if output.size < 4 * n:
+        return []
+    acceleration = (output[2 * n :] - 2.0 * output[n:-n] + output[: -2 * n]) / span**2
+    speed = (output[2 * n :] - output[: -2 * n]) / (2.0 * span)
+    needed = inertia * acceleration + damping * speed + _twice(static, n)
+    slope, together = _together(needed, _twice(torque, n))
+    if abs(together) < TOGETHER:
+        return []
+    text = f"{command} gives {slope:.3g} times the torque that inertia, gravity and spring need"
+    return [Law(text=text, ratio=slope, tolerance=MOTION_TOLERANCE, columns=(command, names[0]),
+                held=HELD)]  # fmt: skip
+
+
+def _twice(values: NDArray, n: int) -> NDArray:
+    """Averages in a triangular window of n rows on both sides, at rows that have both."""
+    once = _slow(values, n)  # less the first value
+    return _slow(once, n)[1:-1] + once[0] + values[0]
+
+
+def _driving_torque(
+    rig: Rig, c: Mapping[str, NDArray], ratio: float
+) -> tuple[str, NDArray, float] | None:
+    """The command, its torque at the gear's output, and the damping there by the back-EMF."""
+    k_t, R, k_e = (rig.torque_constant_Nm_per_A, rig.terminal_resistance_ohm,
+                   rig.back_emf_constant_Vs_per_rad)  # fmt: skip
+    if not k_t:
+        return None
+    if "current_command_A" in c:
+        return "current_command_A", ratio * k_t * c["current_command_A"], 0.0
+    volts = volts_of(rig, c)
+    if volts is None or not R:
+        return None
+    return volts[0], ratio * k_t * volts[1] / R, ratio**2 * k_t * (k_e or k_t) / R
+
+
+def _resisting(
+    rig: Rig, c: Mapping[str, NDArray], output: NDArray, ratio: float
+) -> tuple[float, NDArray]:
+    """Inertia at the gear's output, and the torque of gravity or of the spring; (0, .): unknown."""
+    inertia = ratio**2 * (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0)
+    K, load = rig.spring_stiffness_Nm_per_rad, c.get("load_angle_rad")
+    if rig.has("spring"):
+        if not K or (load is None and rig.has("load")):
+            return 0.0, output
+        together = 0.0 if load is None else correlation_of(output, load)
+        if load is None or abs(together) < FOLLOWS:
+            return inertia, K * (output - (0.0 if load is None else np.sign(together) * load))
+    gravity = 9.81 * (rig.load_mass_kg or 0.0) * (rig.load_distance_m or 0.0)
+    turning = output if rig.axis == "rotary" else np.zeros_like(output)
+    return inertia + (rig.load_inertia_kgm2 or 0.0), gravity * np.sin(turning)
 
 
 def spring_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:

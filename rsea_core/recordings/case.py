@@ -21,7 +21,7 @@ from rsea_core.machine.inputs import (
 )
 from rsea_core.machine.rig import Rig
 from rsea_core.numeric.brief_repr import BriefRepr
-from rsea_core.recordings.column_map import ColumnMap, column_map, merged
+from rsea_core.recordings.column_map import ColumnMap, column_map, for_rig, merged
 from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import COLUMNS, RESPONSES, ROLES, Recording, read_recording
 
@@ -191,8 +191,9 @@ def _flag(table: Mapping, key: str, where: str, default: bool) -> bool:
     return value
 
 
-def _map(table: Mapping | None, where: str) -> ColumnMap | None:
-    return None if table is None else column_map(table, COLUMNS, f"{where}: [columns]")
+def _map(table: Mapping | None, rig: Rig, where: str) -> ColumnMap | None:
+    given = None if table is None else column_map(table, COLUMNS, f"{where}: [columns]")
+    return None if given is None else for_rig(given, rig)
 
 
 def _window(table: Mapping, where: str) -> tuple[float | None, float | None]:
@@ -233,7 +234,7 @@ def _recording(
         description=_word(table, "description", where, ""),
         initial_rest=_flag(table, "initial_rest", where, True),
         quasi_static=_flag(table, "quasi_static", where, False),
-        column_map=_map(merged(shared, table.get("columns")), where),
+        column_map=_map(merged(shared, table.get("columns")), rig, where),
         with_files=_further_files(folder, table, where),
         window_s=_window(table, where),
         report=report,

@@ -7,10 +7,12 @@ measured at the motor divided.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest, number, require_known
+from rsea_core.machine.inputs import POSITION_COMMAND
+from rsea_core.machine.rig import Rig
 
 SOURCE_KEYS = (
     "name", "formula", "unit", "sign", "scale", "zero", "side", "counts_per_rev", "topic", "wrap",
@@ -76,6 +78,8 @@ class ColumnMap:
         Kept as logged, shown in reports, never fitted.
     ignored : tuple of str
         Not read; "*" is all that is not named.
+    linear : bool
+        Whether the axis is linear: lengths and forces are then units of its columns.
     """
 
     sources: tuple[ColumnSource, ...] = ()
@@ -84,6 +88,7 @@ class ColumnMap:
     channels: tuple[tuple[str, str], ...] | None = None
     references: tuple[str, ...] = ()
     ignored: tuple[str, ...] = ()
+    linear: bool = False
 
     def source(self, target: str) -> ColumnSource | None:
         """The source of a column of the contract."""
@@ -125,6 +130,22 @@ def column_map(table: Mapping, targets: tuple[str, ...], where: str) -> ColumnMa
         references=_names(table, "reference", where),
         ignored=_names(table, "ignore", where),
     )
+
+
+def for_rig(columns: ColumnMap, rig: Rig) -> ColumnMap:
+    """The map with what a rig file knows: the counts of its encoders, and a linear axis."""
+    sources = tuple(
+        replace(s, counts_per_rev=counts_of(rig, s.target, s.side))
+        if s.counts_per_rev is None else s
+        for s in columns.sources
+    )  # fmt: skip
+    return replace(columns, sources=sources, linear=rig.axis == "linear")
+
+
+def counts_of(rig: Rig, target: str, side: str | None) -> float | None:
+    """Counts of the encoder that a column is read from; None where the rig file has none."""
+    own = "load" if target == POSITION_COMMAND else side or target.split("_")[0]
+    return getattr(rig, f"{own}_encoder_counts_per_rev", None)
 
 
 def merged(case_table: Mapping | None, own_table: Mapping | None) -> Mapping | None:

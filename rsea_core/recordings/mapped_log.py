@@ -281,7 +281,7 @@ def _series(
     try:
         values = values if source.wrap is None else unwrapped(values, source.wrap)
         si = to_si(values - source.zero, source.unit or stated or target, target,
-                   source.counts_per_rev)  # fmt: skip
+                   source.counts_per_rev, linear=columns.linear)  # fmt: skip
     except RecordingError as problem:
         raise RecordingError(
             f"{path}: {source.target} from {source.name!r}: {problem}"

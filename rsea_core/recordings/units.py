@@ -21,8 +21,8 @@ ENDINGS = {
 SPELLINGS = (
     (r"^(deg(ree)?s?\s*C|°\s*C|celsius)$", "degC"),
     (r"°", "deg"),
-    (r"\bdegs\b|\bdegrees\b", "deg"),
-    (r"\b(revs?|turns?|rotations?|revolutions?|U)\b", "turn"),
+    (r"\bdegs\b|\bdegrees\b|\bgrad\b|\bgrados?\b", "deg"),  # grad: German, not the gon
+    (r"\b(revs?|turns?|rotations?|revolutions?|U|tr)\b", "turn"),
     (r"\b(counts?|cts?|ticks?|pulses|inc|incr|increments?|lsb)\b", "count"),
     (r"\b(sec|secs|seconds)\b", "s"),
     (r"\b(msec|msecs|millis)\b", "ms"),
@@ -47,8 +47,14 @@ def _registry():
     return pint.UnitRegistry()
 
 
+LINEAR = {"rad": "m", "rad/s": "m/s", "N*m": "N"}
+"""Units of a linear axis, of which 1 m is written as 1 rad and 1 N as 1 Nm."""
+
+
 @functools.cache
-def factor_and_offset(unit: str, target: str, counts_per_rev: float | None = None):
+def factor_and_offset(
+    unit: str, target: str, counts_per_rev: float | None = None, *, linear: bool = False
+) -> tuple[float, float]:
     """SI value = factor * reading + offset.
 
     Parameters
@@ -59,6 +65,8 @@ def factor_and_offset(unit: str, target: str, counts_per_rev: float | None = Non
         The unit of the contract's column.
     counts_per_rev : float or None
         Of an encoder whose readings are counts.
+    linear : bool
+        Whether the axis is linear: metres and newtons are units of it too.
 
     Raises
     ------
@@ -71,6 +79,8 @@ def factor_and_offset(unit: str, target: str, counts_per_rev: float | None = Non
         text = re.sub(pattern, instead, text, flags=re.I if "N[" not in pattern else 0)
     try:
         given, wanted = registry.Unit(text), registry.Unit(target)
+        if linear and target in LINEAR and given.dimensionality == _dimensions(LINEAR[target]):
+            wanted = registry.Unit(LINEAR[target])
         is_count = "count" in str(given)
         if is_count and counts_per_rev is None:
             raise RecordingError(f'unit "{unit}" needs counts_per_rev')
@@ -89,9 +99,16 @@ def factor_and_offset(unit: str, target: str, counts_per_rev: float | None = Non
     return float(one - zero) * scale, float(zero)
 
 
-def to_si(values: NDArray, unit: str, target: str, counts_per_rev: float | None = None) -> NDArray:
+def _dimensions(unit: str):
+    return _registry().Unit(unit).dimensionality
+
+
+def to_si(
+    values: NDArray, unit: str, target: str, counts_per_rev: float | None = None, *,
+    linear: bool = False,
+) -> NDArray:  # fmt: skip
     """Readings in the unit of the contract's column; errors as `factor_and_offset`."""
-    factor, offset = factor_and_offset(unit, target, counts_per_rev)
+    factor, offset = factor_and_offset(unit, target, counts_per_rev, linear=linear)
     return values if (factor, offset) == (1.0, 0.0) else factor * values + offset
 
 

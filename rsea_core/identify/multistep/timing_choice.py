@@ -61,13 +61,16 @@ def parameters_with_timing(
 def first_growth(
     case: Case, h: Hypothesis, say, *, timing: CommandTiming | None = None, quick: bool = False
 ) -> Growth:
-    """The same without another growth where the fit is in doubt; its timing is not judged then."""
+    """The same without another growth where the fit is in doubt; its timing is not judged then.
+
+    A quick look does not grow again with another timing: it goes on from the refitted end.
+    """
     first = parameters(MultistepProblem(case, timing=timing or AS_LOGGED), h, say)
     if timing is not None or (in_doubt(first) and not quick):
         return first
     better = in_better_timing(first, case, say)
     timing = better[0].problem.timing
-    if timing == AS_LOGGED:
+    if quick or timing == AS_LOGGED:
         return better
     problem = MultistepProblem(case, timing=timing, steps=better[0].problem.steps)
     again = parameters(problem, h, say)  # grown with this timing

@@ -1,22 +1,33 @@
 """Curves and ladder of a diagnosis: what was simulated, and what it was weighed against."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, distance_errors, nearest
 from rsea_core.identify.result.conclusion import Conclusion
-from rsea_core.identify.result.diagnosis_json import fit_table
 
-COMPARED = 4  # signals drawn in full
+COMPARED, COMPARED_QUICK = 4, 2  # signals drawn in full, and by a quick look
 RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
 SCREENED = "by the screening, not fitted"
 
 
-def curves(conclusion: Conclusion) -> list[dict]:
-    """Recorded and simulated signals, held-out recordings first, the worst signals of each."""
+def curves(
+    conclusion: Conclusion, table: Sequence[dict], *, most: int = COMPARED
+) -> list[dict]:  # fmt: skip
+    """Recorded and simulated signals, held-out recordings first, the worst signals of each.
+
+    Parameters
+    ----------
+    table : sequence of dict
+        The conclusion's `fit_table`.
+    most : int
+        Signals, at most.
+    """
     problem, plain = conclusion.problem, Hypothesis()
-    rows = {(r["file"], r["signal"]): r for r in fit_table(conclusion)}
+    rows = {(r["file"], r["signal"]): r for r in table}
     benches = sorted(problem.benches, key=lambda b: b.recording.role != "validation")
     found: list[dict] = []
     for bench in benches:
@@ -25,7 +36,7 @@ def curves(conclusion: Conclusion) -> list[dict]:
             (row for (file, _), row in rows.items() if file == r.file),
             key=lambda row: -row["nrmse_before"],
         )
-        if not mine or len(found) >= COMPARED:
+        if not mine or len(found) >= most:
             continue
         runs = {
             "before": (plain, problem.start(plain)),
@@ -55,7 +66,7 @@ def curves(conclusion: Conclusion) -> list[dict]:
                     **{f"nrmse_{name}": row[f"nrmse_{name}"] for name in runs},
                 }
             )
-    return found[:COMPARED]
+    return found[:most]
 
 
 def ladder(conclusion: Conclusion) -> list[dict]:

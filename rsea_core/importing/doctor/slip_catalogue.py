@@ -1,6 +1,7 @@
 """The forty slips of a log or rig file that `dftfs doctor` tries on copies of a case."""
 
 import tempfile
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,7 +14,7 @@ from rsea_core.importing.doctor.slip_checks import slips
 from rsea_core.machine.inputs import COMMANDS
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, require_clock
-from rsea_core.recordings.finding import Finding
+from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.quality_checks import data_errors, data_warnings
 from rsea_core.recordings.recording import Recording, check_values
 
@@ -137,8 +138,15 @@ def try_slips(case: Case) -> tuple[SlipResult, ...]:
 
 
 def case_slips(case: Case) -> tuple[Finding, ...]:
-    """The slips that the recordings of a case show as they are."""
-    return tuple(f for r in case.recordings for f in slips(case.rig, r))
+    """The slips that the recordings of a case show as they are.
+
+    A late column is reported if most recordings show it: one slow motion alone has a phase by
+    friction, or by a resistance that is a little off, that looks like a delay.
+    """
+    found = [f for r in case.recordings for f in slips(case.rig, r)]
+    late = Counter(f.column for f in found if f.kind is Kind.CLOCK)
+    most = 0.5 * len(case.recordings)
+    return tuple(f for f in found if f.kind is not Kind.CLOCK or late[f.column] >= most)
 
 
 def _key(f: Finding) -> tuple:

@@ -9,13 +9,15 @@ TERMS = {
     "temps tiempo tempo uhrzeit",
     "duty": "duty pwm dutycycle bridge tastgrad tastverhaltnis",
     "supply": "supply vbus vbat ubat battery bus vdc vsupply",
-    "voltage": "voltage volt volts v u vcmd vq umot spannung",
+    "voltage": "voltage volt volts v u vcmd vq umot uq ucmd vmot uset vset uref vref usoll "
+    "spannung",
     "current": "current currents cur curr i iq amp amps im imot strom iphase courant "
-    "corriente corrente",
+    "corriente corrente icmd iref iset isoll iqcmd iqref iqset iqsoll",
     "torque": "torque torques tau tq trq moment effort loadcell taus ts drehmoment tauext "
-    "couple coppia",
+    "couple coppia force forces kraft cell",
     "velocity": "vel velocity velocities speed omega w qd dq dtheta thetad qdot wm wl dqm dql qdm "
-    "qdl rate drehzahl omegam omegal speeds vitesse velocidad velocita geschwindigkeit",
+    "qdl rate drehzahl omegam omegal speeds vitesse velocidad velocita geschwindigkeit n nmot "
+    "tacho",
     "angle": "angle angles pos position positions theta th phi q enc encoder ang qm ql thm thl "
     "thetam thetal winkel phim phil posm posl rot rotation",
     "temperature": "temp temperature",
@@ -28,7 +30,15 @@ SIDES = {
     "load": "load l link lnk output out arm joint pend pendulum ql thl wl dql qdl thetal phil posl "
     "omegal abtrieb last charge carga carico",
 }
-GOALS = "goal goals ref reference des desired target set setpoint sp cmd command soll want"
+GOALS = (
+    "goal goals ref reference des desired target set setpoint sp cmd command soll want icmd iref"
+    " iset isoll iqcmd iqref iqset iqsoll ucmd vcmd uset vset uref vref usoll"
+)
+LINEAR_TERMS = {
+    "angle": "x pos position lin linear scale carriage table slide stroke weg hub travel schlitten",
+    "torque": "force forces f kraft thrust loadcell",
+}
+"""Of a linear axis: what its columns are named, beside the words above."""
 UNITS = {
     "ms": "ms", "us": "us", "ns": "ns", "s": "s", "sec": "s", "seconds": "s", "msec": "ms",
     "usec": "us", "nsec": "ns", "millis": "ms", "micros": "us", "deg": "deg", "degrees": "deg",
@@ -41,6 +51,10 @@ LAST_UNITS = {"A": "A", "V": "V", "C": "degC", "mA": "mA", "mNm": "mN*m", "Nm": 
 """Units as the last part of a name only, in their own case."""
 LEROBOT = ("action", "observation.state")  # of its data sets: goals and angles of the joints
 LAST_TIME = ("time", "timestamp", "stamp", "times")
+LINEAR_UNITS = {
+    "m": "angle", "mm": "angle", "um": "angle", "\u00b5m": "angle", "\u03bcm": "angle",
+    "cm": "angle", "m/s": "velocity", "mm/s": "velocity", "N": "torque", "kN": "torque",
+}  # fmt: skip
 OF_UNIT = {
     "ms": "time", "us": "time", "ns": "time", "s": "time", "deg": "angle", "rad": "angle",
     "turn": "angle", "count": "angle", "rpm": "velocity", "deg/s": "velocity",
@@ -49,6 +63,7 @@ OF_UNIT = {
 }  # fmt: skip
 _QUANTITY = {w: q for q, text in TERMS.items() for w in text.split()}
 _SIDE = {w: side for side, text in SIDES.items() for w in text.split()}
+_LINEAR = {w: q for q, text in LINEAR_TERMS.items() for w in text.split()}
 _GOAL = frozenset(GOALS.split())
 
 
@@ -71,8 +86,17 @@ class NameEvidence:
     is_goal: bool
 
 
-def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
-    """What a column's name and the unit that the file states for it say."""
+def name_evidence(
+    name: str, stated_unit: str | None = None, *, linear: bool = False
+) -> NameEvidence:
+    """What a column's name and the unit that the file states for it say.
+
+    Parameters
+    ----------
+    linear : bool
+        Whether the axis is linear: lengths and forces are then its angles and torques
+        (1 m is written as 1 rad), and they are the load's.
+    """
     if name in LEROBOT:
         is_goal = name == "action"
         return NameEvidence(quantity="angle", side=None, unit=stated_unit, is_goal=is_goal)
@@ -89,13 +113,21 @@ def name_evidence(name: str, stated_unit: str | None = None) -> NameEvidence:
     elif unit is None:
         last = pieces[-1]
         unit = LAST_UNITS.get(last) if len(pieces) > 1 else None
+        if linear and len(pieces) > 1 and last in LINEAR_UNITS and last != "m":  # motor
+            unit = last
         is_time = _QUANTITY.get(pieces[0].lower()) == "time"  # the s of tau_s is a spring
         unit = unit or (UNITS.get(last.lower()) if last.lower() != "s" or is_time else None)
         bare = " ".join(pieces[:-1]) if unit is not None and len(pieces) > 1 else bare
     parts = [w.lower() for w in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+", bare)]
+    quantity, side = _quantity(parts, unit), next((_SIDE[w] for w in parts if w in _SIDE), None)
+    if linear and unit in LINEAR_UNITS:
+        quantity, side = LINEAR_UNITS[unit], "load"
+    elif linear and quantity in (None, "angle", "torque"):
+        own = next((_LINEAR[w] for w in parts if w in _LINEAR), None)
+        quantity, side = own or quantity, "load" if own and quantity is None else side
     return NameEvidence(
-        quantity=_quantity(parts, unit),
-        side=next((_SIDE[w] for w in parts if w in _SIDE), None),
+        quantity=quantity,
+        side=side,
         unit=unit,
         is_goal=any(w in _GOAL for w in parts),
     )

@@ -29,7 +29,7 @@ class MessageStream:
     def add(self, time_ns: int, message: object) -> None:
         """Add a message: its numbers by their path."""
         self._times.append(time_ns)
-        self._rows.append(dict(_numbers(message, "", 0)))
+        self._rows.append(dict(numbers_of(message)))
 
     def stream(self, first_ns: int) -> Stream | None:
         """The columns, NaN where a message has no such number; None without numbers."""
@@ -55,7 +55,8 @@ def _fields(message: object) -> list[tuple[str, object]]:
     return [(name, getattr(message, name)) for name in own]
 
 
-def _numbers(message: object, path: str, depth: int) -> Iterator[tuple[str, float]]:
+def numbers_of(message: object, path: str = "", depth: int = 0) -> Iterator[tuple[str, float]]:
+    """The numbers of a message, each with its path: `state.position[elbow]`."""
     if depth > DEEPEST:
         return
     fields = _fields(message)
@@ -75,9 +76,9 @@ def _numbers(message: object, path: str, depth: int) -> Iterator[tuple[str, floa
                 if isinstance(item, bool | int | float | np.number):
                     yield f"{own}[{label}]", float(item)
                 elif not isinstance(item, str | bytes):
-                    yield from _numbers(item, f"{own}[{label}]", depth + 1)
+                    yield from numbers_of(item, f"{own}[{label}]", depth + 1)
         elif value is not None and not isinstance(value, str | bytes):
-            yield from _numbers(value, own, depth + 1)
+            yield from numbers_of(value, own, depth + 1)
 
 
 def _joint_names(value: object) -> list[str]:

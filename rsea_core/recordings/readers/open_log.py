@@ -8,6 +8,7 @@ from rsea_core.errors import RecordingError
 from rsea_core.recordings.readers import mcap_log, ros_bag
 from rsea_core.recordings.readers.csv_table import read_csv
 from rsea_core.recordings.readers.hdf5 import is_hdf5, read_hdf5
+from rsea_core.recordings.readers.json_log import is_json, read_json
 from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.matlab import read_matlab
 from rsea_core.recordings.readers.npz import read_npz
@@ -19,7 +20,7 @@ from rsea_core.recordings.readers.torch_file import read_torch
 PICKLES = (".pkl", ".pickle", ".joblib")
 TABLES = (".csv", ".txt", ".dat", ".tsv", ".log")
 SUFFIXES = (*TABLES, ".mat", ".h5", ".hdf5", ".parquet", ".npz", ".npy", ".mcap", ".bag",
-            ".db3", ".tdms", ".pt", ".pth")  # fmt: skip
+            ".db3", ".tdms", ".pt", ".pth", ".jsonl", ".ndjson")  # fmt: skip
 PACKED = {
     b"\x1f\x8b": "packed by gzip: unpack it", b"BZh": "packed by bzip2: unpack it",
     b"\xfd7zXZ": "packed by xz: unpack it", b"7z\xbc\xaf": "packed by 7-Zip: unpack it",
@@ -115,6 +116,8 @@ def _binary_reader(path: Path, head: bytes) -> Callable[[Path], Log] | None:
         return read_matlab
     if is_hdf5(path):
         return read_hdf5
+    if is_json(path, head):
+        return read_json
     if head.startswith(b"PK") and path.suffix.lower() in (".xlsx", ".xlsm", ".ods"):
         raise RecordingError(f"{path}: is a workbook of a spreadsheet: save the sheet as CSV")
     if head.startswith((b"PK", NPY)):

@@ -273,7 +273,7 @@ def test_a_solve_that_finds_no_equilibrium_is_exit_status_3_in_one_line(run, mon
 
 def test_program_is_installed_and_answers_without_a_traceback(tmp_path):
     done = subprocess.run(
-        [sys.executable, "-m", "dftfs.cli.main", "design", "missing.toml"],
+        [sys.executable, "-m", "dftfs", "design", "missing.toml"],
         capture_output=True,
         text=True,
         cwd=os.getcwd(),

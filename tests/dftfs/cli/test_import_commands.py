@@ -58,6 +58,26 @@ def test_a_next_log_whose_load_stands_still_is_listed_as_held(bench):
     assert [r.load.kind for r in read_case(bench / "case").recordings] == ["pendulum", "locked"]
 
 
+def test_a_next_log_is_listed_with_the_load_that_the_others_have_unless_it_moves(bench):
+    imported(bench, "--load", "locked")
+    (bench / "second.csv").write_text((bench / "log.csv").read_text())
+    table = np.genfromtxt(bench / "log.csv", delimiter=",", names=True)
+    held = {n: table[n] * (n != "theta_l") for n in table.dtype.names}
+    write_columns(bench / "third.csv", held)
+    for name in ("second.csv", "third.csv"):
+        assert main(["import", str(bench / name), "--out", str(bench / "case")]) == 0
+    loads = [r.load.kind for r in read_case(bench / "case").recordings]
+    assert loads == ["locked", "pendulum", "locked"]
+
+
+def test_a_first_import_without_a_rig_file_writes_one_with_what_is_open(bench, capsys):
+    text = (bench / "log.csv").read_text().replace("loadcell", "ch7")
+    (bench / "log.csv").write_text(text)
+    assert main(["import", str(bench / "log.csv"), "--out", str(bench / "first")]) == 0
+    assert "not decided yet: column 'ch7'" in capsys.readouterr().out
+    assert "# gear_ratio = ..." in (bench / "first" / "rig.toml").read_text()
+
+
 def test_a_robot_model_fills_in_what_the_rig_file_lacks(bench):
     rig = (bench / "rig.toml").read_text().splitlines()
     kept = [line for line in rig if not line.startswith("load_inertia")]
@@ -88,7 +108,7 @@ def test_what_a_first_import_lacks_is_reported_of_the_file_that_was_written(
     assert "not complete yet: first/rig.toml: rig 'first'" in capsys.readouterr().out
 
 
-def test_questions_are_one_line_and_write_nothing_until_they_are_answered(bench, capsys):
+def test_questions_are_a_line_each_and_write_nothing_until_they_are_answered(bench, capsys):
     text = (bench / "log.csv").read_text().replace("loadcell", "ch7")
     (bench / "log.csv").write_text(text)
     assert imported(bench) == 2

@@ -130,7 +130,7 @@ def test_run_is_blind_scored_and_reported(sealed, tools, tmp_path, capsys):
 
 
 def test_killed_run_goes_on_where_it_stopped(sealed, tools):
-    command = [sys.executable, "-m", "dftfs.cli.main", "prove", "run", str(sealed)]
+    command = [sys.executable, "-m", "dftfs", "prove", "run", str(sealed)]
     command += ["--name", "killed", *tools]
     place = sealed / "runs" / "killed"
     environment = os.environ | {"SLOW": "1.0", "PYTHONPATH": str(ROOT)}

@@ -87,7 +87,7 @@ def python(code: str, *arguments: object) -> str:
 
 
 def dftfs(*arguments: object) -> subprocess.CompletedProcess:
-    command = [sys.executable, "-m", "dftfs.cli.main", *map(str, arguments)]
+    command = [sys.executable, "-m", "dftfs", *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, cwd=ROOT)
 
 

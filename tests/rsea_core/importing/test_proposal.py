@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
+from rsea_core.errors import RecordingError
 from rsea_core.importing.answers import parse_answer
 from rsea_core.importing.case_text import columns_text
 from rsea_core.importing.proposal import answered, propose
 from rsea_core.importing.streams.column_names import name_evidence
 from rsea_core.importing.unit_evidence import step_of
+from rsea_core.machine.rig import Rig
 from tests.rsea_core.recordings.test_consistency_checks import RIG, recorded
 
 
@@ -48,6 +50,57 @@ def test_an_angle_that_was_measured_behind_the_gear_is_found():
     assert (found.unit, found.side) == ("rad", "load")
 
 
+def carriage(**changes):
+    """A motor that moves a carriage by a pinion of 50 rad/m, under a logger's names, in SI."""
+    rig = Rig(
+        name="axis", parts=("drive", "gear", "load"), axis="linear", gear_ratio=50.0,
+        torque_constant_Nm_per_A=0.05, motor_inertia_kgm2=1e-4, load_inertia_kgm2=2.0,
+        motor_encoder_counts_per_rev=4000.0,
+    )  # fmt: skip
+    t = np.arange(4000) * 1e-3
+    x = 0.05 * np.sin(7.0 * t) + 0.02 * np.sin(19.0 * t)
+    force = (2.0 + 50.0**2 * 1e-4) * np.gradient(np.gradient(x, t), t)
+    current = force / (50.0 * 0.05) + 1e-3 * np.random.default_rng(1).normal(size=t.size)
+    data = {"time": t, "Iq_set": current, "I": current, "enc": 50.0 * x, "x_scale": x}
+    return rig, {label: changes.get(label, 1.0) * values for label, values in data.items()}
+
+
+def test_a_linear_axis_is_logged_in_lengths_and_its_current_shows_signs_and_units():
+    counts = 4000.0 / (2.0 * np.pi)
+    rig, data = carriage(x_scale=1e6, enc=-counts, Iq_set=1e3, I=1e3)
+    data |= {n: np.round(data[n]) for n in ("x_scale", "enc")}
+    found = propose(data, {}, rig)
+    own = {c.target: (c.name, c.unit, c.sign) for c in found.columns}
+    assert own["load_angle_rad"] == ("x_scale", "um", 1)
+    assert own["motor_angle_rad"] == ("enc", "count", -1)
+    assert own["current_command_A"] == ("Iq_set", "mA", 1)
+    assert own["current_A"] == ("I", "mA", 1)
+    assert not found.questions
+
+
+def test_a_scale_in_no_unit_is_asked_with_the_factor_that_fits():
+    rig, data = carriage(x_scale=2e6, enc=4000.0 / (2.0 * np.pi))
+    data |= {n: np.round(data[n]) for n in ("x_scale", "enc")}
+    (question,) = propose(data, {}, rig).questions
+    assert "In no unit" in question
+    assert 'name = "x_scale", unit = "um", scale = 0.5' in question
+
+
+def test_a_duty_in_per_mille_is_no_percent():
+    found = propose(raw(pwm=1e3), {}, RIG)
+    assert found.column("duty").unit == "permille"
+    assert not found.questions
+
+
+def test_counts_of_an_encoder_are_those_of_the_rig_file():
+    rig, data = carriage()
+    source = parse_answer("motor_angle_rad=enc:count", data, rig).source
+    assert source.counts_per_rev == 4000.0
+    assert parse_answer("load_angle_rad=x_scale:mm", data, rig).source.unit == "mm"
+    with pytest.raises(RecordingError, match='unit "mm" is no unit of rad'):
+        parse_answer("load_angle_rad=x_scale:mm", data, RIG)
+
+
 def test_what_no_name_tells_is_a_question_and_an_answer_settles_it():
     data = raw()
     data["ch7"] = np.cos(data["t"])
@@ -79,6 +132,9 @@ def test_a_goal_is_a_reference_and_a_log_without_time_says_so():
         ("load_velocity_rad_per_s", "velocity", "load", "rad/s"),
         ("vbus", "supply", None, None),
         ("tau_s", "torque", None, None),
+        ("Ucmd", "voltage", None, None),
+        ("Iq_set", "current", None, None),
+        ("n", "velocity", None, None),
         ("Foo", None, None, None),
     ],
 )

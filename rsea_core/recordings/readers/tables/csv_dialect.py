@@ -74,9 +74,10 @@ def sniff(path: Path) -> Dialect:
     """
     head, is_whole = _head(path)
     encoding, text = _decoded(path, head)
-    if text.lstrip()[:1] in ("{", "<"):
-        kind = "JSON" if text.lstrip()[0] == "{" else "XML or HTML"
-        raise RecordingError(f"{path}: is {kind}, which is not read: save it as CSV or Parquet")
+    if text.lstrip()[:1] == "<":
+        raise RecordingError(
+            f"{path}: is XML or HTML, which is not read: save it as CSV or Parquet"
+        )
     lines, starts = _logical_lines(text.replace("\u2212", "-"))
     if not is_whole and len(lines) > 1:
         lines = lines[:-1]
@@ -251,7 +252,9 @@ def _header(
 ) -> tuple[tuple[str, ...], dict[str, str]]:
     """Names and units of the lines before the data; columns are numbered from 1 where none is."""
     width = len(data[0])
-    above = [cells for cells in lines if len(cells) == width and any(cells)]
+    lines = [c[1:] if c and c[0] in COMMENTS else c for c in lines]
+    at = [k for k, cells in enumerate(lines) if len(cells) == width and any(cells)]
+    above = [lines[k] for k in at]
     if not above:
         commented = [c for c in lines if c and c[0].startswith(COMMENTS)]
         last = [c.lstrip("#%/ ").strip() for c in commented[-1]] if commented else []
@@ -269,7 +272,8 @@ def _header(
         above = [last]
     cells = above[-1]
     below = None
-    if len(above) > 1 and all(UNIT_CELL.match(c) for c in cells) and len(set(above[-2])) == width:
+    two_lines = len(at) > 1 and at[-1] == at[-2] + 1
+    if two_lines and all(UNIT_CELL.match(c) for c in cells) and len(set(above[-2])) == width:
         below, cells = cells, above[-2]
     names: list[str] = []
     units: dict[str, str] = {}

@@ -44,7 +44,7 @@ def wait_until(condition, patience_s=PATIENCE_S):
 def test_killed_in_the_middle_the_next_run_completes_with_the_same_table(tmp_path, capsys):
     cache = tmp_path / "cache"
     process = subprocess.Popen(
-        [sys.executable, "-m", "dftfs.cli.main", *command(tmp_path / "killed", cache)],
+        [sys.executable, "-m", "dftfs", *command(tmp_path / "killed", cache)],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )

@@ -44,6 +44,12 @@ def test_a_strange_table_gives_its_numbers(lines, tmp_path):
     assert np.allclose(columns[1] / scale, X, rtol=1e-12)
 
 
+def test_names_are_those_of_the_last_comment_before_the_rows(tmp_path):
+    lines = ["# wheel one", "# created by a logger, 200 Hz", "# t  x", *(r.replace(",", "  ")
+             for r in PLAIN)]  # fmt: skip
+    assert list(read(tmp_path, lines)[0].columns) == ["t", "x"]
+
+
 def test_text_behind_the_last_row_may_have_delimiters_and_half_a_row_is_no_text(tmp_path):
     rows = [f"{row},1" for row in PLAIN]
     assert read(tmp_path, ["t,x,y", *rows, "End, 12 rows"])[0].rows == 12
@@ -100,7 +106,7 @@ def test_one_reading_a_row_with_the_name_of_its_signal_is_a_stream_for_each(tmp_
     [
         (["t,x", *PLAIN[:5], "9,9,9", *PLAIN[5:]], "data row 6 has more than 2 values"),
         (["t,x,y,z", *(f"{r},1,2,3" for r in PLAIN)], "4 names above rows of 5 values"),
-        (["{", '"t": [1, 2]', "}"], "is JSON"),
+        (["<html>", "<p>1, 2</p>", "</html>"], "is XML or HTML"),
         ([",".join(["1"] * 20_000)] * 4, "has 20000 columns in a row"),
     ],
 )
