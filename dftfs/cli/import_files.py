@@ -10,18 +10,17 @@ from dftfs.files import OutputError, write_text
 from dftfs.report.page_data import write_page
 from dftfs.report.provenance import case_provenance
 from rsea_core.errors import RecordingError, RigError, RseaError
-from rsea_core.importing.case_maker import usual_load
 from rsea_core.importing.case_text import NEEDED, ListedRecording, missing_values, parts_of
 from rsea_core.importing.doctor.slip_catalogue import case_slips
 from rsea_core.importing.proposal import Proposal
-from rsea_core.importing.rest import is_held, starts_in_motion
+from rsea_core.importing.rest import load_of, starts_in_motion
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, read_case
 from rsea_core.recordings.finding import grouped_sentences
 from rsea_core.recordings.quality_checks import data_warnings
-from rsea_core.recordings.recording import Recording
 
 RIG, PREVIEW = "rig.toml", "preview.html"
+HEADER = ("reading", "column", "unit", "sure", "why")
 
 
 def read_back(out: Path, text: str) -> tuple[Case | None, str | None]:
@@ -70,7 +69,7 @@ def read_with_starts(
         return text, case, problem
     others = case.recordings[: -len(listed)]
     own = case.recordings[-len(listed) :]
-    loads = [_load_of(case.rig, r) for r in own]
+    loads = [load_of(case.rig, r) for r in own]
     if guess_load and loads != [r.load.kind for r in own]:
         listed = [replace(x, load=load) for x, load in zip(listed, loads)]
         return read_with_starts(out, listed, text_of)
@@ -78,14 +77,6 @@ def read_with_starts(
     text = text_of([replace(x, initial_rest=at_rest) for x, at_rest in zip(listed, rest)])
     own = tuple(replace(r, initial_rest=at_rest) for r, at_rest in zip(own, rest))
     return text, replace(case, recordings=(*others, *own)), None
-
-
-def _load_of(rig: Rig, r: Recording) -> str:
-    """The load of a recording as its angles show it, as it is listed where they do not."""
-    if is_held(rig, r):
-        return "locked"
-    both = {"motor_angle_rad", "load_angle_rad"} <= set(r.columns)
-    return usual_load(rig) if both and r.load.kind == "locked" else r.load.kind
 
 
 def write_case(
@@ -98,7 +89,7 @@ def write_case(
 ) -> int:
     """Write rig file and preview; print the columns, what is taken, noted and missing."""
     text, case, problem = made
-    notes = []
+    notes: list[str] = []
     if case is not None:
         found = (*case.notes(), *data_warnings(case), *case_slips(case))
         notes = list(dict.fromkeys(grouped_sentences(found)))
@@ -106,21 +97,18 @@ def write_case(
         (c.target, c.name, f"{'-' if c.sign < 0 else ''}{c.unit}", f"{c.confidence:.0%}", c.reason)
         for c in proposal.columns
     ]
-    header = ("reading", "column", "unit", "sure", "why")
     out.mkdir(exist_ok=True)
     if case is not None:
         plots = [(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"} | _raw(r))
                  for r in case.recordings]  # fmt: skip
-        title = f"{out.name}: imported"
-        write_page(out / PREVIEW, "recordings", title=title, head=header, rows=rows, notes=notes,
-                   recordings=plots, facts=case_provenance(case))  # fmt: skip
+        write_page(out / PREVIEW, "recordings", title=f"{out.name}: imported", head=HEADER,
+                   rows=rows, notes=notes, recordings=plots, facts=case_provenance(case))  # fmt: skip
     write_text(out / RIG, text)
     missing = missing_values(rig, parts_of([c.target for c in proposal.columns]))
-    lines = [table(header, rows)]
     state = "taken without asking" if rig is not None else "not decided yet"
-    lines += [f"{state}: {q}" for q in proposal.questions]
-    if proposal.references:
-        lines.append(f"reference, not fitted: {', '.join(proposal.references)}")
+    lines = [table(HEADER, rows), *(f"{state}: {q}" for q in proposal.questions)]
+    listed = ", ".join(proposal.references)
+    lines += [f"reference, not fitted: {listed}"] * bool(listed)
     notes = [*proposal.notes, *notes]
     lines += [f"note: {note}" for note in notes]
     lines += [f"missing in [rig]: {key}: {NEEDED[key]}" for key in missing]

@@ -152,7 +152,26 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
     if theirs > NO_PREDICTION:
         return first  # nothing holds the machine where free runs begin: no opinion
     own = held_out_error(other, "parameters_only")  # the same where it names no law
-    return other if theirs < BETTER * mine and held_out_error(other) <= own else first
+    if not (theirs < BETTER * mine and held_out_error(other) <= own):
+        return first
+    return _with_disagreement(other, first)
+
+
+def _with_disagreement(chosen: Diagnosis, other: Diagnosis) -> Diagnosis:
+    """The chosen diagnosis with a note on what the other method found and this one does not have.
+
+    A law that one of two methods shows clearly must not disappear without a word.
+    """
+    named = {effect["name"] for effect in chosen.document["effects"]}
+    lost = [e for e in other.document["effects"] if e["name"] not in named]
+    if not lost:
+        return chosen
+    laws = " and ".join(f"{e['name']} ({e['law']})" for e in lost)
+    text = (
+        f"two methods disagree: another one found {laws}, and its model predicts whole recordings"
+        " less well; this one does not have it"
+    )
+    return chosen.having(Finding(kind=Kind.METHOD, text=text))
 
 
 def _is_doubtful(found: Diagnosis) -> bool:

@@ -7,8 +7,8 @@ import numpy as np
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.files.csv_columns import unit_of
+from rsea_core.identify.brief_case import brief_case
 from rsea_core.identify.clamped_loads import with_yielding_clamps
-from rsea_core.identify.fitting.truncation import truncate
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import as_effect
@@ -27,7 +27,6 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, Kind, sentences
 from rsea_core.recordings.quality_checks import data_warnings
 
-BRIEF_ROWS, BRIEF_ROWS_OF_EACH = 2500, 250  # fitted: of all recordings, or more of many
 QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
@@ -65,8 +64,7 @@ def diagnose_windows(
     case, clamps = with_yielding_clamps(case)
     cut: tuple[Finding, ...] = ()
     if quick:
-        most = max(BRIEF_ROWS, BRIEF_ROWS_OF_EACH * len(case.identification))
-        case, cut = truncate(case, np.inf, most, reason="without --quick all rows are")
+        case, cut = brief_case(case)
     most_work = np.inf if thorough else QUICK_WORK if quick else MOST_WORK
     with limited_work(most_work, strict=quick) as work:
         found = investigate(case, quick=quick, say=say)

@@ -13,7 +13,7 @@ from rsea_core.importing import log_columns as lc
 from rsea_core.importing.answers import parse_answer, quoted
 from rsea_core.importing.case_text import ListedRecording, columns_text, parts_of, rig_text
 from rsea_core.importing.proposal import Proposal, answered, propose, why_no_time
-from rsea_core.importing.rest import HELD_SPAN, with_rest_as_zero
+from rsea_core.importing.rest import HELD_SPAN, usual_load, with_rest_as_zero
 from rsea_core.importing.streams.wraps import without_wraps, wraps_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
@@ -235,13 +235,6 @@ def _load(raw: Mapping[str, NDArray], proposal: Proposal, rig: Rig | None) -> st
     ]
     behind = spans[0] / (1.0 if motor.side == "load" else rig.gear_ratio or 1.0)
     return "locked" if spans[1] < HELD_SPAN * behind else usual_load(rig)
-
-
-def usual_load(rig: Rig | None) -> str:
-    """The load of a recording that says nothing of it."""
-    if rig is None or (rig.axis == "rotary" and rig.has("load")):
-        return "pendulum"
-    return "free" if rig.has("load") else "locked"
 
 
 def common_load(tables: Mapping) -> str | None:

@@ -33,6 +33,10 @@ BROKEN, BROKEN_ALONE = 2.5, 4.0  # standard deviations of a law, of one of a sin
 SOURCES = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A")
 EXACTLY = 1e-4  # of its scatter: no sensor follows an angle as closely
 STAMPS = ("ts", "tstamp", "t_stamp")  # a time where it rises evenly, a spring's torque elsewhere
+UNKNOWN = (
+    "column {!r}: what is it? Its name says nothing that is known: --column NAME={name}:UNIT,"
+    " or reference={name} if it is not to be fitted"
+)
 COMPUTED = "computed, no sensor measured it; kept as a reference"
 
 
@@ -118,12 +122,7 @@ def propose(
         If no column can be a reading.
     """
     stated = stated or {}
-    own_units = {n: s.unit for n, s in stated.items() if s is not None and s.unit}
-    linear = rig is not None and rig.axis == "linear"
-    evidence = {
-        name: name_evidence(name, own_units.get(name, units.get(name)), linear=linear)
-        for name in raw
-    }
+    evidence = _evidence(raw, units, rig, stated)
     whole = {n: v for n, v in raw.items() if np.all(np.isfinite(v))}
     time = _time_column(whole, evidence, stated)
     if time is None:
@@ -152,11 +151,8 @@ def propose(
     best = best.without(set(made.values()))
     columns = tuple(c for c in _with_signs(best, whole, rig, evidence) if c.name not in made)
     moving = [n for n in unknown if np.ptp(whole[n]) > 0.0 and not _counts_rows(whole[n])]
-    questions = [_question(c, best) for c in columns if c.asks] + [
-        f"column {n!r}: what is it? Its name says nothing that is known: --column NAME={n}:UNIT,"
-        f" or reference={n} if it is not to be fitted"
-        for n in moving
-    ]
+    questions = [_question(c, best) for c in columns if c.asks]
+    questions += [UNKNOWN.format(n, name=n) for n in moving]
     return Proposal(
         columns=columns,
         references=(*goals, *moving, *made),
@@ -165,6 +161,15 @@ def propose(
         questions=tuple(questions),
         rate_needed=False,
     )
+
+
+def _evidence(
+    raw: Mapping[str, NDArray], units: Mapping[str, str], rig: Rig | None, stated
+) -> dict[str, NameEvidence]:
+    """What each column's name says, with the unit that its owner or the file states."""
+    own = {n: s.unit for n, s in stated.items() if s is not None and s.unit}
+    linear = rig is not None and rig.axis == "linear"
+    return {n: name_evidence(n, own.get(n, units.get(n)), linear=linear) for n in raw}
 
 
 def _time_column(

@@ -1,4 +1,4 @@
-"""Where a machine rests: the zero of a pendulum's angle, and recordings that begin in motion."""
+"""How a load is held, where it rests, and recordings that begin in motion."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -46,12 +46,28 @@ def with_rest_as_zero(proposal: Proposal, raw: Mapping[str, NDArray], rig: Rig |
     return replace(proposal, columns=columns, questions=(*proposal.questions, question))
 
 
+def usual_load(rig: Rig | None) -> str:
+    """The load of a recording that says nothing of it: with gravity where the rig file has it."""
+    if rig is None:
+        return "pendulum"
+    hangs = bool(rig.load_mass_kg and rig.load_distance_m)
+    return ("pendulum" if hangs else "free") if rig.has("load") else "locked"
+
+
 def is_held(rig: Rig, r: Recording) -> bool:
     """Whether the load hardly moves while the motor does."""
     if not {"motor_angle_rad", "load_angle_rad"} <= set(r.columns) or not rig.gear_ratio:
         return False
     moved = float(np.ptp(r["motor_angle_rad"])) / rig.gear_ratio
     return float(np.ptp(r["load_angle_rad"])) < HELD_SPAN * moved
+
+
+def load_of(rig: Rig, r: Recording) -> str:
+    """The load of a recording as its angles show it, as it is listed where they do not."""
+    if is_held(rig, r):
+        return "locked"
+    both = {"motor_angle_rad", "load_angle_rad"} <= set(r.columns)
+    return usual_load(rig) if both and r.load.kind == "locked" else r.load.kind
 
 
 def starts_in_motion(rig: Rig, r: Recording) -> bool:

@@ -23,12 +23,20 @@ JUMP = 0.1  # of an input's range, within a kept row
 SLACK = 1e-6  # of a row: sample times are rounded
 
 
-def decimate(case: Case, row_s: float) -> Case:
-    """The case with rows as long as they may be, up to `row_s` [s]."""
-    return replace(case, recordings=tuple(_decimate(case.rig, r, row_s) for r in case.recordings))
+def decimate(case: Case, row_s: float, *, jumps: bool = False) -> Case:
+    """The case with rows as long as they may be, up to `row_s` [s].
+
+    Parameters
+    ----------
+    jumps : bool
+        Recordings whose inputs jump within such rows too.
+    """
+    return replace(
+        case, recordings=tuple(_decimate(case.rig, r, row_s, jumps) for r in case.recordings)
+    )
 
 
-def _decimate(rig: Rig, r: Recording, row_s: float) -> Recording:
+def _decimate(rig: Rig, r: Recording, row_s: float, jumps: bool) -> Recording:
     every = int(row_s / r.sample_time_s + SLACK)
     kept = r.rows // max(every, 1)
     if every < 2 or kept < FEWEST_ROWS or r.quasi_static:
@@ -37,7 +45,7 @@ def _decimate(rig: Rig, r: Recording, row_s: float) -> Recording:
     for name, values in r.columns.items():
         rows = values[: kept * every].reshape(kept, every)
         held = name in HELD or name == r.command_name
-        if held and _jumps(rows):
+        if held and not jumps and _jumps(rows):
             return r
         columns[name] = read_only(rows.mean(axis=1) if held else rows[:, 0].copy())
     if "current_A" in columns and r.command_name is not None:

@@ -20,6 +20,7 @@ from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.engines.fixed_step.step_length import STEP_PER_MODE, longest_step_s
 from rsea_core.errors import RecordingError
+from rsea_core.identify.candidates.motion_cycles import VELOCITIES, cycle_s, motion_rate
 from rsea_core.identify.candidates.rig_parameters import DAMPINGS, Nominal
 from rsea_core.identify.candidates.typical_magnitudes import own_magnitudes
 from rsea_core.identify.fitting.predictions import Windows, readings_of, run_machines
@@ -48,11 +49,6 @@ from rsea_core.recordings.initial_speed import begins_at_rest, start_speeds
 from rsea_core.recordings.recording import Recording
 
 DELAY_STEP_ROWS = 0.1
-# a logged velocity is what the drive's filter made of it: read where there is no angle
-VELOCITIES = {
-    "motor_angle_rad": "motor_velocity_rad_per_s",
-    "load_angle_rad": "load_velocity_rad_per_s",
-}
 LEAST_ROWS = 30  # of a recording
 LEAST_STEP_s = 1e-4  # of the engine, before it is made finer
 STATED_BOUND, FREE_BOUND = 5.0, 1e4  # tolerances that a value may move
@@ -216,7 +212,7 @@ def experiment(
         more["initial_speeds_rad_per_s"] = tuple(each.speed for each in speeds)
     replay = Replay.of(inputs, **of_rows, **more)
     numbers = replay.numbers(model)
-    cycle = _cycle_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
+    cycle = cycle_s(machine_of(numbers), model.rig.spring_stiffness_Nm_per_rad or 0.0, r)
     finer, name = 1, inputs.command_name
     if timing.smooth and name is not None and turns_often(getattr(inputs, name)):
         means = mean_commands(getattr(inputs, name), timing.fast_share)
@@ -248,36 +244,6 @@ def _columns_of_rows(r: Recording) -> dict[str, NDArray]:
     """Columns beside the command that act on the drive: its enable signal and its supply."""
     needed = {"drive_enabled": r.command_name, "supply_V": r.command_name == "duty"}
     return {name: r[name] for name, needs in needed.items() if needs and name in r}
-
-
-def _cycle_s(plant: mp.Plant, stiffness: float, r: Recording) -> float:
-    """Period of the fastest swing: of the machine, of gravity's, of the motion's."""
-    rates = [2.0 * np.pi / (r.time_s[-1] - r.time_s[0])]
-    elastic = plant.structure in (mp.ELASTIC_FREE, mp.ELASTIC_HELD)
-    whole = plant.inertia + plant.load_inertia
-    if elastic and stiffness > 0.0:
-        free = plant.structure == mp.ELASTIC_FREE and plant.load_inertia > 0.0
-        rates.append(
-            np.sqrt(stiffness * (1.0 / plant.inertia + free / (plant.load_inertia or 1.0)))
-        )
-    if plant.gravity > 0.0 and whole > 0.0:
-        rates.append(np.sqrt(plant.gravity / (plant.load_inertia if elastic else whole)))
-    if plant.drive == mp.POSITION:  # the slower of its two real modes, where they are real
-        damping = (plant.volts_per_speed + plant.damping + plant.load_damping) or 1e-300
-        swing = np.sqrt(plant.volts_per_command / whole) if whole > 0.0 else np.inf
-        rates.append(min(swing, plant.volts_per_command / damping))
-    rates.append(_motion_rate(r))
-    return float(2.0 * np.pi / max(rates))
-
-
-def _motion_rate(r: Recording) -> float:
-    """Speed over angle [1/s] of a recording's motion, the fastest of its angles."""
-    rates = [0.0]
-    for name in (*VELOCITIES, *VELOCITIES.values()):
-        if name in r:
-            spread = float(np.std(r[name])) or 1.0
-            rates.append(float(np.std(np.diff(r[name]))) / r.sample_time_s / spread)
-    return max(rates)
 
 
 def _predicted(name: str, r: Recording, replay: Replay, current_commanded: bool) -> bool:
@@ -344,7 +310,7 @@ class MultistepProblem(Problem):
         if by_volts and (one_body or not of_load):
             electric = plant.torque_per_ampere * plant.volts_per_speed / plant.resistance
         side = ratio**2 if n.key.startswith("motor") else 1.0
-        rate = max(_motion_rate(e.recording) for e in self.fitted)
+        rate = max(motion_rate(e.recording) for e in self.fitted)
         scale = max(DAMPED * (inertia * rate + electric), self._damping_of_drive())
         return replace(n, tolerance=scale / side)
 

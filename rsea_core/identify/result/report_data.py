@@ -23,7 +23,7 @@ from rsea_core.identify.locate.signatures import signatures
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.effect_curves import law_curves
-from rsea_core.identify.result.signal_curves import COMPARED, COMPARED_QUICK, curves, ladder
+from rsea_core.identify.result.signal_curves import COMPARED, QUICK_COMPARED, curves, ladder
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.machine.rig import QUANTITIES, Rig
 from rsea_core.recordings.finding import grouped_sentences
@@ -59,14 +59,13 @@ def report_data(
     seconds : float or None
         How long the diagnosis took.
     quick : bool
-        Compare fewer signals, and leave out what needs the recordings smoothed once more: torques
-        and mismatch at the ports.
+        Compare fewer signals; no torques and mismatch at the ports, which need smoothed states.
     """
     conclusion, document = diagnosis.conclusion, diagnosis.document
     case, rig = conclusion.case, conclusion.rig()  # values found: ports show missing physics
     moving, smoothed = smoothed_recordings(rig, () if quick else case.identification)
     located = locate(rig, moving, smoothed) if moving else None
-    place = (document["location"] or {}).get("subsystem")
+    place, scores = (document["location"] or {}).get("subsystem"), document["fit"]["recordings"]
     found: dict[str, Any] = {
         "case": case.name,
         "rig": case.rig.name,
@@ -82,10 +81,8 @@ def report_data(
         "separability": _separability(moving, smoothed),
         "effects": [_effect(e) for e in document["effects"]],
         "parameters": _parameters(document["parameters_corrected"]),
-        "scores": [_score(row) for row in document["fit"]["recordings"]],
-        "comparisons": curves(
-            conclusion, document["fit"]["recordings"], most=COMPARED_QUICK if quick else COMPARED
-        ),
+        "scores": [_score(row) for row in scores],
+        "comparisons": curves(conclusion, scores, most=QUICK_COMPARED if quick else COMPARED),
         "ladder": ladder(conclusion),
         "laws": law_curves(conclusion),
         "weighed": WEIGHED,

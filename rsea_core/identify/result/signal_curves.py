@@ -9,7 +9,7 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, distance_errors, nearest
 from rsea_core.identify.result.conclusion import Conclusion
 
-COMPARED, COMPARED_QUICK = 4, 2  # signals drawn in full, and by a quick look
+COMPARED, QUICK_COMPARED = 4, 2  # signals drawn in full, and by a quick look
 RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
 SCREENED = "by the screening, not fitted"
 

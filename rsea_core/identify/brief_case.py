@@ -1,0 +1,100 @@
+"""What a quick look fits of a case: few rows, of motion and not of standstill.
+
+A search simulates every row some thousand times. Of a recording with more rows than its share, rows
+that are far shorter than the machine's fastest cycle are taken together, and what is left begins
+where the motion does.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from rsea_core.identify.candidates.motion_cycles import cycle_s, motion_rate
+from rsea_core.identify.fitting.decimation import decimate
+from rsea_core.identify.fitting.problem import machine_of
+from rsea_core.identify.fitting.truncation import truncate
+from rsea_core.identify.multistep.experiment import MultistepProblem
+from rsea_core.numeric.arrays import read_only
+from rsea_core.recordings.case import Case, noise_floor
+from rsea_core.recordings.finding import Finding, Kind
+from rsea_core.recordings.recording import Recording
+
+BRIEF_ROWS, BRIEF_ROWS_OF_EACH = 2500, 250  # fitted: of all recordings, or more of many
+MOST_ROWS = 2  # times as many, where motions are slow
+ROWS_OF_CYCLE = 10  # of the fastest cycle, at least
+CYCLES = 1.0  # of its own motion, that a recording should show
+MOVED = 10.0  # noise deviations that a reading moves where a motion begins
+LEAD = 0.05  # of the rows that are kept, before it
+REASON = "without --quick all rows are"
+
+
+def brief_case(case: Case) -> tuple[Case, tuple[Finding, ...]]:
+    """The case with few rows of each recording that is fitted, and what was left out.
+
+    Returns
+    -------
+    Case
+        The same one where it is short enough.
+    tuple of Finding
+        What was taken together or cut.
+    """
+    most = max(BRIEF_ROWS, BRIEF_ROWS_OF_EACH * len(case.identification))
+    if sum(r.rows for r in case.identification) <= most:
+        return case, ()
+    coarse, findings = _in_coarse_rows(case, most)
+    most = min(max(most, _rows_of_motion(coarse)), MOST_ROWS * most)
+    moving = replace(
+        coarse, recordings=tuple(_from_first_motion(coarse, r, most) for r in coarse.recordings)
+    )
+    cut, more = truncate(moving, np.inf, most, reason=REASON)
+    return cut, (*findings, *more)
+
+
+def _rows_of_motion(case: Case) -> int:
+    """Rows in which every recording shows some cycles of its own motion."""
+    cycles = [
+        2.0 * np.pi / max(motion_rate(r), 1e-9) / r.sample_time_s for r in case.identification
+    ]
+    longest = max(min(CYCLES * n, r.rows) for n, r in zip(cycles, case.identification, strict=True))
+    return int(longest * len(cycles))
+
+
+def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:
+    """Rows as long as the fastest cycle of all recordings allows, and no longer than needed."""
+    problem = MultistepProblem(case)
+    cycles = [cycle_s(machine_of(e.base), e.stiffness, e.recording) for e in problem.benches]
+    longest_s = min(cycles) / ROWS_OF_CYCLE
+    share = most / len(case.identification)
+    needed_s = max(r.rows * r.sample_time_s for r in case.identification) / share
+    coarse = decimate(case, min(longest_s, needed_s), jumps=True)
+    findings = tuple(
+        Finding(
+            kind=Kind.TRUNCATED,
+            file=new.file,
+            text=f"fitted in rows of {new.sample_time_s:.3g} s, means of those logged: {REASON}",
+        )
+        for old, new in zip(case.recordings, coarse.recordings, strict=True)
+        if new.rows < old.rows and new.role == "identification"
+    )
+    return coarse, findings
+
+
+def _from_first_motion(case: Case, r: Recording, most: int) -> Recording:
+    """A recording without the standstill at its beginning, as far as it has rows to spare."""
+    spare = r.rows - most // max(len(case.identification), 1)
+    if r.role != "identification" or r.quasi_static or not r.initial_rest or spare <= 0:
+        return r
+    floors = noise_floor(case.rig, r)
+    begins = [_first_beyond(r[name], MOVED * floors[name]) for name in r.responses]
+    lead = int(LEAD * (r.rows - spare))
+    first = min(max(min(begins) - lead, 0), spare) if begins else 0
+    columns = {name: read_only(values[first:].copy()) for name, values in r.columns.items()}
+    columns["time_s"] = read_only(columns["time_s"] - columns["time_s"][0])
+    return replace(r, columns=columns)
+
+
+def _first_beyond(values: Sequence[float], allowed: float) -> int:
+    """The first row that differs from the first one by more than is allowed; all rows if none."""
+    far = np.abs(np.asarray(values) - values[0]) > allowed
+    return int(np.argmax(far)) if far.any() else len(values)
