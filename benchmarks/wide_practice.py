@@ -8,7 +8,6 @@ set, its test is predicted from the model.toml written, and the set's own script
 """
 
 import argparse
-import json
 import subprocess
 import sys
 import time
@@ -16,11 +15,9 @@ from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 
 from rsea_core.errors import RseaError
+from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.diagnose import diagnose
-from rsea_core.identify.result.corrected_model import FoundModel, write_prediction
-from rsea_core.identify.spring_bench.diagnose import diagnose_bench, is_spring_bench
-from rsea_core.model.model_file import model_to_toml
-from rsea_core.recordings.case import Case, read_case, read_test
+from rsea_core.identify.result.predict import predict
 
 
 def run_case(folder: Path, out: Path) -> str:
@@ -28,30 +25,16 @@ def run_case(folder: Path, out: Path) -> str:
     begun, target = time.perf_counter(), out / folder.name
     target.mkdir(parents=True, exist_ok=True)
     try:
-        document, model_toml = _diagnosed(read_case(folder))
-        (target / "diagnosis.json").write_text(json.dumps(document), encoding="utf-8")
-        path = target / "model.toml"
-        path.write_text(model_toml, encoding="utf-8")
-        model = FoundModel.from_toml(path)
-        tests = read_test(folder / "test", model.rig) if (folder / "test").is_dir() else ()
-        for test in tests:
-            write_prediction(model, test, target / "prediction.csv")
+        found = diagnose(folder)
+        model = found.save(target)["model.toml"]
+        if (folder / "test").is_dir():
+            for prediction in predict(model, folder / "test").values():
+                write_columns(target / "prediction.csv", prediction.columns)
     except RseaError as refused:
         return f"{folder.name}: {refused}"
-    named = ", ".join(
-        f"{e['name']} ({e['confidence']:.2f})" for e in document["effects"]
-    )  # fmt: skip
+    named = ", ".join(f"{e['name']} ({e['confidence']:.2f})" for e in found.effects)
     seconds = time.perf_counter() - begun
-    return f"{folder.name}: {document['verdict']}: {named or '-'}; {seconds:.1f} s"
-
-
-def _diagnosed(case: Case) -> tuple[dict, str]:
-    """`diagnosis.json` and `model.toml` of a machine, or of a spring on a bench."""
-    if is_spring_bench(case):
-        bench = diagnose_bench(case)
-        return bench.document(), model_to_toml(bench.model())
-    found = diagnose(case)
-    return found.document, found.model.to_toml()
+    return f"{folder.name}: {found.verdict}: {named or '-'}; {seconds:.1f} s"
 
 
 def main() -> int:

@@ -25,7 +25,7 @@ Time: row k of a trajectory or recording is read at time_s[k] before row k's com
 command is held from there to row k + 1. A simulation starts at rest and without current.
 
 Start with `Rig.preset("rsea-bench")`, `ActuatorModel(rig).describe()`, `simulate`, and
-`run_scenario` for a closed loop.
+`run_scenario` for a closed loop; with recordings of a machine, `diagnose` and `predict`.
 """
 
 from importlib import import_module
@@ -34,10 +34,14 @@ __version__ = "0.2.0"
 
 _PLACES = {
     "ActuatorModel": "rsea_core.model.actuator_model",
+    "Case": "rsea_core.recordings.case",
+    "Diagnosis": "rsea_core.identify.result.diagnosis",
     "InputError": "rsea_core.errors",
     "Inputs": "rsea_core.machine.inputs",
     "Load": "rsea_core.machine.inputs",
     "PidTorque": "rsea_core.control",
+    "Prediction": "rsea_core.identify.result.predict",
+    "Recording": "rsea_core.recordings.recording",
     "Reference": "rsea_core.simulation.reference",
     "Replay": "rsea_core.engines.fixed_step.replay",
     "Rig": "rsea_core.machine.rig",
@@ -46,11 +50,14 @@ _PLACES = {
     "Trajectory": "rsea_core.simulation.trajectory",
     "bode": "rsea_core.performance.frequency",
     "controller": "rsea_core.control.laws.own_law",
+    "diagnose": "rsea_core.identify.diagnose",
     "linearise": "rsea_core.engines.linear.linearise",
     "loop_margins": "rsea_core.control",
     "natural_frequencies": "rsea_core.performance.frequency",
     "output_impedance": "rsea_core.performance.frequency",
     "performance_table": "rsea_core.performance.table_2_1",
+    "predict": "rsea_core.identify.result.predict",
+    "read_case": "rsea_core.recordings.case",
     "read_model": "rsea_core.model.model_file",
     "read_spring_curve": "rsea_core.model.spring_curve_file",
     "readings": "rsea_core.effects.sensor_reading",
@@ -66,10 +73,14 @@ _PLACES = {
 }
 __all__ = [
     "ActuatorModel",
+    "Case",
+    "Diagnosis",
     "InputError",
     "Inputs",
     "Load",
     "PidTorque",
+    "Prediction",
+    "Recording",
     "Reference",
     "Replay",
     "Rig",
@@ -78,11 +89,14 @@ __all__ = [
     "Trajectory",
     "bode",
     "controller",
+    "diagnose",
     "linearise",
     "loop_margins",
     "natural_frequencies",
     "output_impedance",
     "performance_table",
+    "predict",
+    "read_case",
     "read_model",
     "read_spring_curve",
     "readings",

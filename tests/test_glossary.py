@@ -24,7 +24,6 @@ ALLOWED = (
         r"[\"`.#]remainder|^_?remainder(_figure)?$|^(Remainder|REMAINDER)$",
         "key, file and section of diagnosis.json",
     ),
-    ("remainders?", r".*diagnose_routes\.py", "remainder : columns", "that key"),
     ("remainders?", r".*diagnosis\.html", "remainder is not none", "that key"),
     ("remainders?", r".*making\.py", "largest remainders", "a method of apportionment"),
     (

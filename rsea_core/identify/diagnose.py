@@ -1,21 +1,28 @@
-"""One call from a case to its diagnosis: by free runs on the bench, by windows anywhere else.
+"""One call from a case to its diagnosis: of a spring's bench, a map of steady speeds, a machine.
 
-Free runs over whole recordings say most where the machine holds them: the bench, with a duty to a
-bridge, every sensor and rows of a millisecond (`is_bench`). Everywhere else laws are judged by
-predictions over windows with estimated starts and an estimated noise (`multistep`). Where that
-leaves dependent innovations or finds no name - no law fits the machine quite - free runs are a
-second opinion, and the model that predicts the recordings held out better speaks. The bench asks
-windows so where its free runs find no name, names that leave much, or one that an amplifier's
-offset imitates: free runs do not model the errors of a log.
+`diagnose` is what `dftfs diagnose` calls. A machine that moves (`diagnose_machine`) is diagnosed by
+free runs on the bench, by windows anywhere else. Free runs over whole recordings say most where the
+machine holds them: the bench, with a duty to a bridge, every sensor and rows of a millisecond
+(`is_bench`). Everywhere else laws are judged by predictions over windows with estimated starts and
+an estimated noise (`multistep`). Where that leaves dependent innovations or finds no name - no law
+fits the machine quite - free runs are a second opinion, and the model that predicts the recordings
+held out better speaks. The bench asks windows so where its free runs find no name, names that leave
+much, or one that an amplifier's offset imitates: free runs do not model the errors of a log.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from rsea_core.effects.load_unbalance import LoadUnbalance
+from rsea_core.effects.registry import SpringCurve
 from rsea_core.effects.sensor_offset import SensorOffset
-from rsea_core.errors import RecordingError, RseaError
+from rsea_core.errors import InputError, RecordingError, RseaError
+from rsea_core.files.text_files import as_plain
+from rsea_core.identify.experiment.experiment_file import FILE, as_entry, decisive_experiment
 from rsea_core.identify.free_run_diagnosis import diagnose_free_runs
 from rsea_core.identify.multistep.criteria import (
     DOUBTED_SHARE,
@@ -25,9 +32,17 @@ from rsea_core.identify.multistep.criteria import (
 )
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
+from rsea_core.identify.result.report_data import report_data
+from rsea_core.identify.spring_bench.diagnose import is_spring_bench
+from rsea_core.identify.static_diagnosis import (
+    diagnose_spring_bench,
+    diagnose_steady_map,
+    require_spring_bench,
+)
+from rsea_core.identify.steady_map.points import is_steady_map
 from rsea_core.identify.window_diagnosis import diagnose_windows
 from rsea_core.numeric.threads import on_one_blas_thread
-from rsea_core.recordings.case import Case
+from rsea_core.recordings.case import Case, read_case
 from rsea_core.recordings.finding import Finding, Kind
 
 BENCH_ROW_s = 2.5e-3
@@ -42,6 +57,80 @@ WINDOWS_FAILED = Finding(
     text="the search in windows failed numerically; laws were judged by free runs of whole"
     " recordings instead, which is less reliable for this machine; please report the case",
 )
+
+
+def diagnose(
+    case: Case | str | Path,
+    *,
+    quick: bool = False,
+    thorough: bool = False,
+    design: SpringCurve | None = None,
+    next_experiment: bool | None = None,
+    say: Callable[[str], None] | None = None,
+) -> Diagnosis:
+    """Say where recordings and rig file differ, which physics is missing, with what confidence.
+
+    As `dftfs diagnose`: of a spring on its bench, of a map of steady speeds or of a machine that
+    moves; which of these, the recordings say.
+
+    Parameters
+    ----------
+    case : Case or path
+        As `read_case` makes it, or its folder.
+    quick : bool
+        Fewer fits of fewer rows: a quick look, not to be acted on.
+    thorough : bool
+        Finer steps and no limit of work.
+    design : SpringCurve or None
+        Of a spring on its bench: the curve that it should have (`read_spring_curve`).
+    next_experiment : bool or None
+        Whether to compute, of a machine that moves, what to record next (seconds). None: not in a
+        quick look. One that the verdict `insufficient-data` rests on is there in any case.
+    say : callable or None
+        Given a line now and then while it works.
+
+    Raises
+    ------
+    RecordingError, RigError
+        If the case breaks the file contract, or nothing in the recordings can be simulated.
+    InputError
+        If quick and thorough are both asked for, or a design is given and no spring is measured.
+    """
+    if quick and thorough:
+        raise InputError("diagnose: quick and thorough exclude one another")
+    say = say or _silent
+    if not isinstance(case, Case):
+        case = read_case(case, say)
+    if design is not None:
+        require_spring_bench(case, "diagnose: design")
+    if is_spring_bench(case):
+        found = diagnose_spring_bench(case, design)
+    elif is_steady_map(case):
+        found = diagnose_steady_map(case)
+    else:
+        found = diagnose_machine(case, quick=quick, thorough=thorough, say=say)
+        wanted = not quick if next_experiment is None else next_experiment
+        found = _complete(found, wanted=wanted, quick=quick)
+    return replace(found, document=as_plain(found.document))
+
+
+def _silent(message: str) -> None:
+    """Say nothing."""
+
+
+def _complete(found: Diagnosis, *, wanted: bool, quick: bool) -> Diagnosis:
+    """A machine's diagnosis with its next experiment, unexplained signal and report."""
+    asked = wanted or found.verdict == "insufficient-data"
+    experiment = decisive_experiment(found.conclusion) if asked else None
+    residual = found.conclusion.residual
+    return replace(
+        found,
+        document=found.document | {"next_experiment": as_entry(experiment)},
+        next_columns=None if experiment is None else experiment.columns,
+        next_recording=None if experiment is None else experiment.recording_toml(FILE),
+        unexplained_columns=None if residual is None else residual.columns(),
+        report_data=partial(report_data, found, experiment=experiment, quick=quick),
+    )
 
 
 def is_bench(case: Case) -> bool:
@@ -64,14 +153,14 @@ def _is_of_bench(r) -> bool:
 
 
 @on_one_blas_thread
-def diagnose(
+def diagnose_machine(
     case: Case,
     *,
     quick: bool = False,
     thorough: bool = False,
     say: Callable[[str], None] = lambda _: None,
 ) -> Diagnosis:
-    """Locate, name and fit what a case's recordings show and its rig file does not.
+    """Locate, name and fit what recordings of a moving machine show and its rig file does not.
 
     Raises
     ------

@@ -16,7 +16,6 @@
 Numbers are written so that reading them back gives the same ones to the bit.
 """
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -26,6 +25,7 @@ import numpy as np
 from rsea_core.effects.registry import LAWS, SpringCurve, Term
 from rsea_core.effects.variant import Law
 from rsea_core.errors import RigError, RseaError, TermError
+from rsea_core.files.text_files import write_whole
 from rsea_core.files.toml_tables import (
     nearest,
     number,
@@ -179,14 +179,7 @@ def write_model(model: ActuatorModel, path: str | Path) -> Path:
     OSError
         If it cannot be written.
     """
-    target = Path(path)
-    unfinished = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        unfinished.write_text(model_to_toml(model), encoding="utf-8")
-        unfinished.replace(target)
-    finally:
-        unfinished.unlink(missing_ok=True)
-    return target
+    return write_whole(path, model_to_toml(model))
 
 
 def model_to_toml(model: ActuatorModel) -> str:

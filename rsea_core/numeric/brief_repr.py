@@ -35,7 +35,8 @@ def brief(value: object) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if is_dataclass(value) and not isinstance(value, type):
-        name = getattr(value, "name", None) or getattr(value, "kind", None)
+        named = (getattr(value, key, None) for key in ("name", "kind", "file"))
+        name = next((given for given in named if given), None)
         return type(value).__name__ + (f" {name!r}" if isinstance(name, str) else "")
     if isinstance(value, dict | list | tuple) and len(value) > 0:
         inside = ", ".join(brief(v) for v in list(value)[:4])

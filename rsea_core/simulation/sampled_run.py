@@ -68,7 +68,17 @@ class MachineNumbers(NamedTuple):
         """Computed once and kept with the model, which does not change.
 
         Not kept where a user's effect acts: it may have another compiled function in the next run.
+
+        Raises
+        ------
+        InputError
+            If the model is none.
         """
+        if not isinstance(model, ActuatorModel):
+            raise InputError(
+                f"{type(model).__name__} cannot be simulated: give an ActuatorModel, as a"
+                " diagnosis' actuator_model() or read_model makes it"
+            )
         key = ("sampled run", command_name, load)
         if key not in model.kept:
             plant = model.plant(command_name, load)

@@ -1,5 +1,8 @@
 """Results show themselves in a few lines, and every public name is where it says."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -23,6 +26,13 @@ def test_results_have_a_representation_of_a_few_lines():
 @pytest.mark.parametrize("name", rsea_core.__all__)
 def test_every_public_name_can_be_had(name):
     assert getattr(rsea_core, name).__name__ == name
+
+
+def test_the_import_alone_loads_no_library_and_no_search():
+    heavy = ("numpy", "scipy", "numba", "rsea_core.identify", "rsea_core.engines")
+    code = f"import sys, rsea_core; print([m for m in {heavy} if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.stdout.strip() == "[]", done.stderr
 
 
 def test_a_name_that_is_not_there_is_an_attribute_error():

@@ -7,7 +7,7 @@ with terms (`model_file`, `diagnosed_effects`), which comments in it show.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -23,10 +23,9 @@ from rsea_core.engines.fixed_step.replay import Replay
 from rsea_core.files.csv_columns import write_columns
 from rsea_core.identify.fitting.problem import Problem, predict_readings
 from rsea_core.machine.command_motion import FINER, between_rows
-from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
-from rsea_core.model.diagnosed_effects import BETWEEN_KEY, HEAT_KEYS, REST_KEY, map_laws
-from rsea_core.model.model_file import AMBIENT_C, read_model_file, term_to_toml
+from rsea_core.model.diagnosed_effects import BETWEEN_KEY, HEAT_KEYS, REST_KEY
+from rsea_core.model.model_file import AMBIENT_C, ModelFile, read_model_file, term_to_toml
 from rsea_core.recordings.case import InputRecording
 
 CONTACT = {
@@ -40,37 +39,19 @@ Laws = tuple[tuple[Law, Mapping[str, float]], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
-class FoundModel:
-    """A corrected rig and its laws.
+class FoundModel(ModelFile):
+    """A corrected rig and its laws, as `model.toml` holds them.
 
-    Attributes
-    ----------
-    contact : mapping
-        Factors of stiffness and damping of contacts, shift of their angle.
-    laws : tuple of (Law, values)
-    ambient_C : float
-    terms : tuple of Term
-        More physics, written into the file by hand.
-    initial_rises_K : (float, float) or None
-        Rise of a warming motor's winding and case when the last recording ended.
-    rest_rad : float
-        How far from slack a wheel with play rests, either way, where no torque reading tells.
-    command_between_rows : "held" or "linear"
-        How the command moves from a row to the next.
+    `terms` are more physics, written into the file by hand; `model` is the machine with all of it,
+    for simulations.
     """
 
-    rig: Rig
-    contact: Mapping[str, float]
-    laws: Laws
-    ambient_C: float = AMBIENT_C
     terms: tuple[Term, ...] = ()
-    initial_rises_K: tuple[float, float] | None = None
-    rest_rad: float = 0.0
-    command_between_rows: str = "held"
+    ambient_C: float = AMBIENT_C
 
     def to_toml(self) -> str:
         """The text of `model.toml`."""
-        mapped = map_laws(self.rig, self.laws, ambient_C=self.ambient_C, contact=self.contact)
+        mapped = self.mapped
         lines = [self.rig.to_toml(), "[found]", f"ambient_C = {self.ambient_C!r}"]
         lines += [f"{key} = {float(value)!r}" for key, value in self.contact.items()]
         if self.initial_rises_K is not None:
@@ -104,11 +85,7 @@ class FoundModel:
             If the file cannot be read, or a law is not known.
         """
         held = read_model_file(path)
-        return cls(
-            rig=held.rig, contact=held.contact, laws=held.laws, ambient_C=held.ambient_C,
-            terms=held.terms, initial_rises_K=held.initial_rises_K, rest_rad=held.rest_rad,
-            command_between_rows=held.command_between_rows,
-        )  # fmt: skip
+        return cls(**{f.name: getattr(held, f.name) for f in fields(held)})
 
     def predict(self, test: InputRecording) -> dict[str, NDArray]:
         """Readings that this model expects of unseen inputs: time and `PREDICTED`.

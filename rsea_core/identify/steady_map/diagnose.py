@@ -79,6 +79,8 @@ class MapDiagnosis:
         Best leave-one-out error first; `chosen` is one of them.
     next_columns : mapping or None
         A ready-to-run list of steady speeds.
+    findings : tuple of Finding
+        Those of the document, as data.
     """
 
     document: dict
@@ -88,6 +90,7 @@ class MapDiagnosis:
     fits: tuple[MapFit, ...]
     chosen: MapFit
     next_columns: Mapping[str, NDArray] | None
+    findings: tuple[Finding, ...]
 
 
 def choose(fits: list[MapFit], n: int) -> MapFit:
@@ -188,11 +191,8 @@ def diagnose_map(case: Case) -> MapDiagnosis:
         document=document,
         model=_model(case, p, fits, plain),
         report_data=map_report_data(case, p, fits, chosen, plain, document, findings),
-        points=p,
-        fits=tuple(fits),
-        chosen=chosen,
-        next_columns=columns,
-    )
+        points=p, fits=tuple(fits), chosen=chosen, next_columns=columns, findings=findings,
+    )  # fmt: skip
 
 
 def _verdict(p: SteadyPoints, chosen: MapFit, plain: MapFit) -> str:

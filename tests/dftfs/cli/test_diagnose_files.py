@@ -1,6 +1,7 @@
 """A diagnosis writes all its files or none, and leaves none of an older diagnosis."""
 
 import argparse
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,30 +9,29 @@ import pytest
 import dftfs.cli.diagnose as command
 import dftfs.cli.main as program
 from dftfs.cli.diagnose import write_files
-from dftfs.cli.diagnose_routes import Result
 from dftfs.cli.output import prepared
 from dftfs.report.page_data import SUFFIX
 from rsea_core.errors import RseaError
 from rsea_core.files.csv_columns import write_columns
-from rsea_core.identify.experiment import experiment_file
-from rsea_core.identify.judgement import residual
+from rsea_core.identify.result.diagnosis import SOMETIMES, Diagnosis
+from rsea_core.identify.spring_bench import next_loop
 
 
 def test_the_names_of_the_files_are_those_that_their_makers_use():
-    assert command.NEXT == experiment_file.FILE
-    assert command.REMAINDER == residual.FILE
-    assert command.FILES[-1] == f"report{SUFFIX}"
+    assert next_loop.FILE in SOMETIMES
+    assert command.REPORT[-1] == f"report{SUFFIX}"
 
 
 def interrupted():
     raise KeyboardInterrupt
 
 
-def result(shown, **more) -> Result:
-    return Result(
+def result(report_data, **more) -> Diagnosis:
+    return Diagnosis(
         document={"verdict": "no-mismatch", "next_experiment": None},
-        model_toml="[rig]\n",
-        shown=shown,
+        model=SimpleNamespace(to_toml=lambda: "[rig]\n"),
+        conclusion=None,
+        report_data=report_data,
         **more,
     )
 
@@ -49,7 +49,7 @@ def test_files_of_an_older_diagnosis_that_this_one_has_not_are_taken_away(tmp_pa
     drawn = "dftfs.report.diagnosis.render.write_diagnosis_report"
     monkeypatch.setattr(drawn, lambda page, path: path.touch())
     (tmp_path / "remainder.csv").write_text("older")
-    paths = write_files(result(dict, columns={"time_s": np.arange(3.0)}), tmp_path)
+    paths = write_files(result(dict, next_columns={"time_s": np.arange(3.0)}), tmp_path)
     names = {"diagnosis.json", "model.toml", "report.html", "next.csv"}
     assert set(paths) == names == {p.name for p in tmp_path.iterdir()}
 

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+import rsea_core
 from dftfs.cli.main import main
 from rsea_core.effects.registry import SpringCurve, SpringHysteresis
 from rsea_core.identify.spring_bench.history_columns import stop
@@ -107,6 +108,9 @@ def test_a_path_that_never_turns_back_asks_for_one_that_does(tmp_path, capsys):
     path = np.loadtxt(out / asked["file"], delimiter=",", skiprows=1)
     assert path[:, 1].min() < -0.19 < 0.19 < path[:, 1].max()
     assert "record next: turn the spring" in capsys.readouterr().out
+    saved = rsea_core.diagnose(case).save(tmp_path / "saved")  # the library writes the same files
+    assert set(saved) == {"diagnosis.json", "model.toml", "next.csv", "next.toml"}
+    assert all(path.read_bytes() == (out / name).read_bytes() for name, path in saved.items())
 
 
 def test_time_that_is_only_an_index_explains_nothing(tmp_path):

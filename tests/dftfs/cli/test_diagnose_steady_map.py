@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 
+import rsea_core
 from dftfs.cli.main import main
 from rsea_core.identify.result.corrected_model import FoundModel
 from tests.cases.recorded import map_case
@@ -28,6 +29,9 @@ def test_a_steady_map_gets_a_diagnosis_a_model_and_a_report(tmp_path, capsys):
     assert "steady speeds" in (out / "report.html").read_text()
     speeds = np.loadtxt(out / "next.csv", delimiter=",", skiprows=1)[:, 1]
     assert speeds.min() < 0.0 < speeds.max()
+    saved = rsea_core.diagnose(case).save(tmp_path / "saved")  # the library writes the same files
+    assert set(saved) == {"diagnosis.json", "model.toml", "next.csv"}
+    assert all(path.read_bytes() == (out / name).read_bytes() for name, path in saved.items())
 
 
 def test_a_map_of_two_speeds_is_refused_in_one_line(tmp_path, capsys):

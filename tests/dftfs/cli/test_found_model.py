@@ -7,7 +7,10 @@ import pytest
 
 from dftfs.cli.main import main
 from rsea_core.effects.known_variants import laws_by_key
-from rsea_core.identify.result.corrected_model import FoundModel
+from rsea_core.errors import RseaError
+from rsea_core.files.csv_columns import read_columns
+from rsea_core.identify.result.corrected_model import PREDICTED, FoundModel
+from rsea_core.identify.result.predict import predict
 from rsea_core.machine.rig import Rig
 from rsea_core.model.model_file import read_model
 
@@ -91,6 +94,10 @@ def test_a_prediction_reads_the_same_file(folder):
     out = folder / "prediction.csv"
     assert main(["predict", str(folder / "model.toml"), str(test), "--out", str(out)]) == 0
     assert out.read_text(encoding="utf-8").startswith("time_s,motor_angle_rad,load_angle_rad")
+    written = read_columns(out, RseaError, required=("time_s",), optional=PREDICTED)
+    predicted = predict(str(folder / "model.toml"), test)["input.csv"].columns
+    assert written.keys() == predicted.keys()
+    assert all(np.array_equal(written[name], predicted[name]) for name in written)
 
 
 def test_a_prediction_into_a_folder_is_refused_in_one_line(folder, capsys):

@@ -10,7 +10,7 @@ import rsea_core.identify.window_diagnosis as window_diagnosis
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.gear_load_friction import GearLoadFriction
-from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose, held_out_error
+from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose_machine, held_out_error
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import CURTAILED
@@ -53,7 +53,7 @@ def test_free_runs_replace_windows_only_where_they_predict_clearly_better(
     opinions = {"windows": opinion(windows, alone), "free runs": opinion(free_runs, alone)}
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
-    assert diagnose(case) is opinions[taken]
+    assert diagnose_machine(case) is opinions[taken]
 
 
 def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_stands(
@@ -69,7 +69,7 @@ def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_sta
     monkeypatch.setattr(f"{HERE}.is_bench", lambda case: True)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
-    assert diagnose(case) is opinions["windows"]
+    assert diagnose_machine(case) is opinions["windows"]
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_a_second_opinion_is_asked_where_innovations_depend_or_nothing_is_named(
     opinions["windows"].conclusion.estimator.tempering = share
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
-    assert diagnose(case) is opinions[taken]
+    assert diagnose_machine(case) is opinions[taken]
 
 
 def test_a_second_opinion_is_asked_where_the_work_of_the_first_was_limited_too(
@@ -107,7 +107,7 @@ def test_a_second_opinion_is_asked_where_the_work_of_the_first_was_limited_too(
     first.findings, second = (CURTAILED,), opinion(0.1, 3.0)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: first)
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: second)
-    assert diagnose(case) is second
+    assert diagnose_machine(case) is second
 
 
 def test_free_runs_have_no_opinion_on_laws_found_with_a_gear_mesh(tmp_path, monkeypatch):
@@ -118,7 +118,7 @@ def test_free_runs_have_no_opinion_on_laws_found_with_a_gear_mesh(tmp_path, monk
     first.conclusion.found.best.hypothesis.laws = (SimpleNamespace(effect=MESH_DAMPER),)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: first)
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinion(0.1, 3.0))
-    assert diagnose(case) is first
+    assert diagnose_machine(case) is first
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_complete_laws_of_windows_replace_those_of_free_runs_that_leave_much(
     monkeypatch.setattr(f"{HERE}.is_bench", lambda case: True)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
-    assert diagnose(case) is opinions[taken]
+    assert diagnose_machine(case) is opinions[taken]
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_complete_laws_of_windows_replace_what_acts_like_an_amplifier_offset(
     monkeypatch.setattr(f"{HERE}.is_bench", lambda case: True)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
-    assert diagnose(case) is opinions[taken]
+    assert diagnose_machine(case) is opinions[taken]
 
 
 def test_a_search_in_windows_that_fails_is_stated_with_what_free_runs_found(tmp_path, monkeypatch):
@@ -174,7 +174,7 @@ def test_a_search_in_windows_that_fails_is_stated_with_what_free_runs_found(tmp_
     runs = Diagnosis(document={"findings": ["first"]}, model=None, conclusion=None)
     monkeypatch.setattr(f"{HERE}.diagnose_windows", fails)
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: runs)
-    found = diagnose(axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig()))
+    found = diagnose_machine(axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig()))
     assert found.document["findings"] == ["first", WINDOWS_FAILED.sentence()]
     assert found.findings == (WINDOWS_FAILED,)
     assert runs.document["findings"] == ["first"]
@@ -194,7 +194,7 @@ def test_a_servo_has_friction_that_grows_with_its_load_and_a_weak_supply(monkeyp
     Their better models have friction that depends on the load, too.
     """
     monkeypatch.setattr(window_diagnosis, "MOST_WORK", 2e7)
-    found = diagnose(recorded("bam-xl330"))
+    found = diagnose_machine(recorded("bam-xl330"))
     assert found.document["verdict"] == "missing-physics"
     named = {effect["name"] for effect in found.document["effects"] if effect["confidence"] > 0.5}
     assert named == {GearLoadFriction.effect, DriveSaturation.effect}
@@ -207,7 +207,7 @@ def test_dry_friction_of_a_ball_screw_is_named_and_predicts_the_record_held_out(
     Free runs find the friction even if the search in windows has little work.
     """
     monkeypatch.setattr(window_diagnosis, "MOST_WORK", 2e7)
-    found = diagnose(recorded("emps"))
+    found = diagnose_machine(recorded("emps"))
     assert found.document["verdict"] == "missing-physics"
     (effect,) = found.document["effects"]
     assert effect["name"] == GearFriction.effect
