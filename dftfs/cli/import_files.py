@@ -101,14 +101,14 @@ def write_case(
     if case is not None:
         plots = [(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"} | _raw(r))
                  for r in case.recordings]  # fmt: skip
-        write_page(out / PREVIEW, "recordings", title=f"{out.name}: imported", head=HEADER,
-                   rows=rows, notes=notes, recordings=plots, facts=case_provenance(case))  # fmt: skip
+        shown = {"head": HEADER, "rows": rows, "notes": notes, "facts": case_provenance(case)}
+        title = f"{out.name}: imported"
+        write_page(out / PREVIEW, "recordings", title=title, recordings=plots, **shown)
     write_text(out / RIG, text)
     missing = missing_values(rig, parts_of([c.target for c in proposal.columns]))
     state = "taken without asking" if rig is not None else "not decided yet"
     lines = [table(HEADER, rows), *(f"{state}: {q}" for q in proposal.questions)]
-    listed = ", ".join(proposal.references)
-    lines += [f"reference, not fitted: {listed}"] * bool(listed)
+    lines += [f"reference, not fitted: {', '.join(proposal.references or ('none',))}"]
     notes = [*proposal.notes, *notes]
     lines += [f"note: {note}" for note in notes]
     lines += [f"missing in [rig]: {key}: {NEEDED[key]}" for key in missing]
