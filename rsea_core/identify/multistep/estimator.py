@@ -250,8 +250,13 @@ def independent_share(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
     """Share of the innovations that count: expected over found variance of stretches' scores.
 
     Innovations of a machine that is not quite the model's are dependent, and their sheer number
-    must not outweigh what the rig file says (sandwich of Huber and White, per unknown; the median
-    over the unknowns).
+    must not outweigh what the rig file says. The score of an unknown is the derivative of the
+    data's part of the cost by it, up to its sign, summed over a stretch. The share is one over the
+    median over the unknowns of found over expected variance of the scores, within `LEAST_SHARE` and
+    1. Both variances belong to the middle matrix of the sandwich of Huber and White; its inverse
+    Hessians are not applied. The ratio of an unknown is therefore that of its sandwich variances
+    only with one unknown or a diagonal Hessian. Unknowns that the prior determines take part like
+    any other.
     """
     level, columns = estimator.jacobian(h, x)
     expected, found = np.zeros(x.size), np.zeros(x.size)
