@@ -154,8 +154,12 @@ def predicted_cost(unseen: Estimator, own: Estimator, h: Hypothesis, x: NDArray)
     """Least cost of recordings held out, the values within the uncertainty of their fit.
 
     On an axis without a restoring torque, a value that is wrong by its standard deviation causes an
-    angle error of many times the noise at the end of a recording. The values therefore move, at the
-    cost of their posterior distribution (posterior predictive likelihood, Laplace's approximation).
+    angle error of many times the noise at the end of a recording. The values therefore move. The
+    result is the least sum, over the values, of the cost of the recordings held out and of half the
+    quadratic form of the fitted rows and the prior about the fit: the negative logarithm of a
+    profile predictive likelihood (Bjornstad, Statistical Science 5 (1990) 242). It is not Laplace's
+    approximation of a predictive density, which has a determinant too. Without that term a further
+    value is not penalised: that it may move can only lower the minimum.
 
     Parameters
     ----------
