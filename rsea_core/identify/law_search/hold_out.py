@@ -1,11 +1,18 @@
-"""Rows that no choice and no fit sees, and what a model found gains there.
+"""Rows that values were not fitted to, and what a model found gains there.
 
-Recordings that the case holds out serve as they are. A case without any, or with such that the
-laws do not concern, lends the last quarter of
-each recording: both hypotheses are fitted to the rows before it once more. If only
-recordings held out let the load move, or include a contact, the others show nothing of it: two
-thirds of these are fitted then, and the last third stays held out. So are two thirds of recordings
-that parameters do not predict, although these suffice for those fitted.
+Recordings that the case holds out serve as they are. Laws, values and noise come from the others,
+but the states from which their windows start are smoothed on their own readings, with each model.
+What they show is otherwise independent of the fit, and not of the search: laws that they refute are
+dropped, and formulas that they do not confirm (`whole_runs/unseen.py` has further such uses).
+
+A case without any, or with such that the laws do not concern, lends the last quarter of each
+recording, after the search: both hypotheses are fitted to the rows before it once more. This tests
+the values alone. The choice of the laws, the noise, the tempering and the smoothed starts of
+windows were made from these rows too, so that their gain is no independent evidence of a law.
+
+If only recordings held out let the load move, or include a contact, the others show nothing of it:
+two thirds of these are fitted then, and the last third stays held out. So are two thirds of
+recordings that parameters do not predict, although these suffice for those fitted.
 """
 
 from collections.abc import Sequence
