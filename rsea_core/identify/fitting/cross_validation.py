@@ -5,7 +5,9 @@ torque it ranks the luck of its offset, not its physics. Windows of a few second
 from the smoothed state (`smooth`) with what the motion does not show (presliding, play, spring
 memory, heat) carried along the measured motion by the law's own equations (`Replay.warm`), rank
 the physics. The cross-validated figure fits on some windows and measures on the others; folds are
-interleaved in time, so that each sees the whole recording's conditions.
+interleaved in time, so that each sees the whole recording's conditions. A diagnosis fits to windows
+(`selection/final_refinement.py`) and does not cross-validate: `cross_validate` serves
+`benchmarks/real_recordings_figures.py`.
 
 Sources: multiple shooting with given starts, docs/diagnosis.md 5.3, 5.4; folds of blocks instead of
 rows because errors of neighbouring rows go together (Roberts et al., Ecography 40 (2017) 913).
