@@ -295,8 +295,8 @@ class WindowVerdict(Conclusion):
         own = self.found.estimator
         before = own.innovations([(self.found.base.hypothesis, self.found.base.x)])
         after = own.innovations([(self.fit.hypothesis, self.fit.x)])
-        had = sum(float(np.sum(np.maximum(huber_squares(e) - 1.0, -1.0))) for e in before)
-        left = sum(float(np.sum(np.maximum(huber_squares(e) - 1.0, -1.0))) for e in after)
+        had = sum(float(np.sum(huber_squares(e) - 1.0)) for e in before)
+        left = sum(float(np.sum(huber_squares(e) - 1.0)) for e in after)
         return float(np.clip(1.0 - max(left, 0.0) / had, 0.0, 1.0)) if had > 0.0 else 0.0
 
     def mismatched_recordings(self) -> str:

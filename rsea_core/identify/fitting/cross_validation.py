@@ -223,7 +223,6 @@ def fit_windows(
     hypothesis: Hypothesis,
     x: NDArray,
     *,
-    iterations: int = ITERATIONS,
     with_free_run: bool = False,
 ) -> Fit:
     """Fit a hypothesis to the used windows; its errors' scale follows what each round leaves."""
@@ -239,7 +238,7 @@ def fit_windows(
         if not np.isfinite(left) or left <= 0.0:
             break
         tempering = problem.tempering / left
-        fit = fitter.fit(hypothesis, x, iterations=iterations, tempering=tempering)
+        fit = fitter.fit(hypothesis, x, iterations=ITERATIONS, tempering=tempering)
         x = fit.x
     return fitter.fit(hypothesis, x, iterations=1) if fit is None else fit
 

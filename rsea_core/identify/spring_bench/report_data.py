@@ -24,9 +24,7 @@ TEXTS = {
 }
 
 
-def spring_report_data(
-    conclusion: SpringConclusion, document: dict, *, command: str = ""
-) -> dict[str, Any]:
+def spring_report_data(conclusion: SpringConclusion, document: dict) -> dict[str, Any]:
     """What a report shows of a spring's bench; keys are those of its page."""
     case, found = conclusion.case, conclusion.found
     scores = conclusion.fit_table()
@@ -65,7 +63,6 @@ def spring_report_data(
         "remainder": _remainder(document, scores),
         "findings": grouped_sentences(conclusion.findings()),
         "facts": [
-            *([("command", command)] if command else []),
             ("compared with", conclusion.design.source if conclusion.design is not None
              else "the rig's stiffness" if found.known else "the best straight line"),
             *((r.file, f"{r.load.kind}, {r.role}: {r.description}") for r in case.recordings),
