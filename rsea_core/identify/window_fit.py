@@ -223,26 +223,26 @@ def _largest_unknown_torque(
     return max(found)
 
 
-def rungs_of(steps: Sequence[Step], parameters: FoundFit, fit: FoundFit) -> list[dict]:
+def ranked_explanations(steps: Sequence[Step], parameters: FoundFit, fit: FoundFit) -> list[dict]:
     """What was considered, by gain over parameters alone."""
-    found = [_rung("parameters only", "", parameters.msni, 0.0)]
+    found = [_explanation("parameters only", "", parameters.msni, 0.0)]
     gain = 0.0
     names: list[str] = []
     for step in steps:
         for law, other in step.rivals:
             name = " + ".join([*names, law.effect])
-            found.append(_rung(name, law.subsystem, fit.msni, gain + other, law.law))
+            found.append(_explanation(name, law.subsystem, fit.msni, gain + other, law.law))
         gain += step.gain
         names.append(step.law.effect)
         name, place = " + ".join(names), step.law.subsystem
-        found.append(_rung(name, place, fit.msni, gain, step.law.law))
+        found.append(_explanation(name, place, fit.msni, gain, step.law.law))
     chosen = " + ".join(names) or "parameters only"
-    for rung in found:
-        rung["chosen"] = rung["name"] == chosen and rung["gain"] == gain
-    return sorted(found, key=lambda rung: (not rung["chosen"], -rung["gain"]))
+    for row in found:
+        row["chosen"] = row["name"] == chosen and row["gain"] == gain
+    return sorted(found, key=lambda row: (not row["chosen"], -row["gain"]))
 
 
-def _rung(name: str, place: str, power: NDArray, gain: float, note: str = "") -> dict:
+def _explanation(name: str, place: str, power: NDArray, gain: float, note: str = "") -> dict:
     return {
         "name": name, "subsystem": place, "error": float(np.sqrt(np.max(power))), "gain": gain,
         "se": RIVAL_SCALE + RIVAL_SHARE * abs(gain), "chosen": False, "note": note,

@@ -48,7 +48,7 @@ from rsea_core.identify.window_fit import (
     late_command,
     leaves_much_torque,
     leaves_some_torque,
-    rungs_of,
+    ranked_explanations,
     spread_of,
     strained_value,
     unknown_torque,
@@ -286,9 +286,9 @@ class WindowVerdict(Conclusion):
     def _innovations(self) -> list[NDArray]:
         return self.estimator.innovations([(self.fit.hypothesis, self.fit.x)])
 
-    def rungs(self) -> list[dict]:
+    def ranked_explanations(self) -> list[dict]:
         """What was considered, by gain over parameters alone."""
-        return rungs_of(self.found.steps, self.search.parameters, self.fit)
+        return ranked_explanations(self.found.steps, self.search.parameters, self.fit)
 
     def explained_excess(self) -> float:
         """Share of what the parameters leave, in the noise of the chosen fit, that laws take."""

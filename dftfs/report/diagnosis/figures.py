@@ -206,27 +206,27 @@ def state_figure(item: StateMap) -> ReportFigure:
         )
 
 
-def ladder_figure(ladder: tuple[Candidate, ...], weighed: str = "") -> ReportFigure:
+def ranked_explanations_figure(ranked: tuple[Candidate, ...], weighed: str = "") -> ReportFigure:
     """Gain of each explanation over parameters alone, with standard errors."""
     with house_style():
-        figure = new_figure(0.95 + 0.34 * len(ladder))
+        figure = new_figure(0.95 + 0.34 * len(ranked))
         axes = figure.subplots()
-        for k, rung in enumerate(ladder):
-            colour = BLUE if rung.chosen else LIGHT
-            axes.barh(k, rung.gain, color=colour, height=0.62)
+        for k, row in enumerate(ranked):
+            colour = BLUE if row.chosen else LIGHT
+            axes.barh(k, row.gain, color=colour, height=0.62)
             axes.errorbar(
-                rung.gain, k, xerr=2.0 * rung.se, color=INK, lw=1.0, capsize=2.5, fmt="none"
+                row.gain, k, xerr=2.0 * row.se, color=INK, lw=1.0, capsize=2.5, fmt="none"
             )
         axes.axvline(0.0, color=GREY, lw=0.8)
-        axes.set_yticks(range(len(ladder)), [rung.name for rung in ladder])
-        for tick, rung in zip(axes.get_yticklabels(), ladder, strict=True):
-            tick.set_fontweight("bold" if rung.chosen else "normal")
+        axes.set_yticks(range(len(ranked)), [row.name for row in ranked])
+        for tick, row in zip(axes.get_yticklabels(), ranked, strict=True):
+            tick.set_fontweight("bold" if row.chosen else "normal")
         axes.invert_yaxis()
         axes.grid(axis="y", visible=False)
         figure.supxlabel(  # long names leave the axes narrower than these words
             "gain of log score over parameters alone (2 s.e.)", fontsize="medium"
         )
-        best = max(ladder, key=lambda rung: rung.gain)
+        best = max(ranked, key=lambda row: row.gain)
         return as_svg(
             figure,
             name="ladder",

@@ -125,7 +125,7 @@ class EffectCard:
 
 @dataclass(frozen=True, kw_only=True)
 class Candidate:
-    """A rung of the ladder: an explanation that was considered.
+    """An explanation that was considered; those of a page are its ranked explanations.
 
     Attributes
     ----------
@@ -217,7 +217,7 @@ class DiagnosisPage:
     doubted : bool
         Whether the files contain errors that must be corrected first.
     weighed : str
-        On what the ladder's explanations were weighed.
+        On what the ranked explanations were weighed.
     comparisons : tuple of Comparison
         Held-out recordings first.
     record_next : str

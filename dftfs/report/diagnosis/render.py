@@ -105,7 +105,7 @@ def diagnosis_figures(page: DiagnosisPage) -> Mapping[str, ReportFigure]:
     if page.state_map is not None:
         found.append(draw.state_figure(page.state_map))
     if page.ladder:
-        found.append(draw.ladder_figure(page.ladder, page.weighed))
+        found.append(draw.ranked_explanations_figure(page.ladder, page.weighed))
     if page.remainder is not None:
         found.append(draw.remainder_figure(page.remainder))
     if page.next_experiment is not None:

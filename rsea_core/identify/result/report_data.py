@@ -23,7 +23,12 @@ from rsea_core.identify.locate.signatures import signatures
 from rsea_core.identify.result.conclusion import Conclusion
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.effect_curves import law_curves
-from rsea_core.identify.result.signal_curves import COMPARED, QUICK_COMPARED, curves, ladder
+from rsea_core.identify.result.signal_curves import (
+    COMPARED,
+    QUICK_COMPARED,
+    curves,
+    ranked_explanations,
+)
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 from rsea_core.machine.rig import QUANTITIES, Rig
 from rsea_core.recordings.finding import grouped_sentences
@@ -83,7 +88,7 @@ def report_data(
         "parameters": _parameters(document["parameters_corrected"]),
         "scores": [_score(row) for row in scores],
         "comparisons": curves(conclusion, scores, most=QUICK_COMPARED if quick else COMPARED),
-        "ladder": ladder(conclusion),
+        "ladder": ranked_explanations(conclusion),
         "laws": law_curves(conclusion),
         "weighed": WEIGHED,
         "remainder": _remainder(document),

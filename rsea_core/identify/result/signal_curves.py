@@ -1,4 +1,4 @@
-"""Curves and ladder of a diagnosis: what was simulated, and what it was weighed against."""
+"""Curves and ranked explanations of a diagnosis: what was simulated and weighed."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,7 @@ from rsea_core.identify.judgement.alternatives import considered, distance_error
 from rsea_core.identify.result.conclusion import Conclusion
 
 COMPARED, QUICK_COMPARED = 4, 2  # signals drawn in full, and by a quick look
-RUNGS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
+EXPLANATIONS, RICHER = 8, 2  # explanations shown, with more effects than were chosen
 SCREENED = "by the screening, not fitted"
 
 
@@ -69,33 +69,33 @@ def curves(
     return found[:most]
 
 
-def ladder(conclusion: Conclusion) -> list[dict]:
+def ranked_explanations(conclusion: Conclusion) -> list[dict]:
     """What was considered, by score over parameters alone, as `alternatives` counts distances.
 
     An explanation's error is that of its distance to the chosen one.
     """
-    if hasattr(conclusion, "rungs"):
-        return conclusion.rungs()
+    if hasattr(conclusion, "ranked_explanations"):
+        return conclusion.ranked_explanations()
     search, plain = conclusion.search, conclusion.search.parameters
     chosen = conclusion.fit if conclusion.fit.hypothesis.laws else plain
     mine = chosen.hypothesis.effects
     whole = search.behind(chosen, plain) if mine else 0.0
     others = considered(search, chosen, effects=max(len(mine), 1) + 1)
-    rungs = [_rung(chosen, whole, 0.0, chosen=True)]
+    found = [_explanation(chosen, whole, 0.0, chosen=True)]
     if mine:
-        rungs.append(_rung(plain, 0.0, distance_errors(search, chosen, [plain])[0]))
+        found.append(_explanation(plain, 0.0, distance_errors(search, chosen, [plain])[0]))
     as_short = [o for o in others if len(set(o.fit.hypothesis.effects)) <= len(mine)]
     listed = [n for name in mine for n in nearest(search, chosen, as_short, name)]
     # a prediction of more effects than were chosen is none: only fits say whether they are worth it
     richer = [o for o in others if o.fitted and len(set(o.fit.hypothesis.effects)) > len(mine)]
-    shown = {id(o): o for o in (*listed, *richer[: RICHER if mine else RUNGS])}
+    shown = {id(o): o for o in (*listed, *richer[: RICHER if mine else EXPLANATIONS])}
     for other in shown.values():
         note = "" if other.fitted else SCREENED
-        rungs.append(_rung(other.fit, whole - other.behind, other.se, note=note))
-    return sorted(rungs, key=lambda rung: (not rung["chosen"], -rung["gain"]))
+        found.append(_explanation(other.fit, whole - other.behind, other.se, note=note))
+    return sorted(found, key=lambda row: (not row["chosen"], -row["gain"]))
 
 
-def _rung(fit: Fit, gain: float, se: float, *, chosen: bool = False, note: str = "") -> dict:
+def _explanation(fit: Fit, gain: float, se: float, *, chosen: bool = False, note: str = "") -> dict:
     laws = fit.hypothesis.laws
     return {
         "name": " + ".join(fit.hypothesis.effects) or "parameters only",

@@ -15,7 +15,7 @@ from rsea_core.identify.spring_bench.loops import BenchRows
 from rsea_core.identify.spring_bench.regression import zero_of
 from rsea_core.recordings.finding import grouped_sentences
 
-COMPARED, LOOPS, RUNGS = 4, 4, 8
+COMPARED, LOOPS, EXPLANATIONS = 4, 4, 8
 TEXTS = {
     SpringHysteresis.effect: SpringHysteresis.headline,
     SpringHardening.effect: "The stiffness changes with the deflection.",
@@ -58,7 +58,7 @@ def spring_report_data(conclusion: SpringConclusion, document: dict) -> dict[str
         ],
         "comparisons": [_comparison(conclusion, r) for r in _shown(conclusion)[:COMPARED]],
         "laws": [_loop(conclusion, r) for r in _shown(conclusion)[:LOOPS]],
-        "ladder": _ladder(conclusion),
+        "ladder": _ranked_explanations(conclusion),
         "weighed": "parts of the recordings that took no part in its fit",
         "remainder": _remainder(document, scores),
         "findings": grouped_sentences(conclusion.findings()),
@@ -121,20 +121,20 @@ def _effect(effect: dict) -> dict:
     }  # fmt: skip
 
 
-def _ladder(conclusion: SpringConclusion) -> list[dict]:
+def _ranked_explanations(conclusion: SpringConclusion) -> list[dict]:
     """Explanations by gain over a mere scale, in logarithms of the error on parts left out."""
     found = conclusion.found
     per_floor = float(
         np.mean([np.std(r.torque_Nm) / conclusion.floor(r) for r in found.bench.rows])
     )
-    base, rungs = found.plain.fit, []
+    base, rows = found.plain.fit, []
     for candidate in found.candidates:
         if candidate.fit is None:
             continue
         blocks = base.left_out.size
         better = 0.5 * blocks * float(np.log(base.error / candidate.fit.error))
         mean, scatter = gain(base, candidate.fit)
-        rungs.append(
+        rows.append(
             {
                 "name": "another scale" if not candidate.pieces else candidate.name,
                 "subsystem": ", ".join(effects_of(candidate)) or "parameters",
@@ -143,8 +143,8 @@ def _ladder(conclusion: SpringConclusion) -> list[dict]:
                 "chosen": candidate is found.best, "note": "",
             }
         )  # fmt: skip
-    rungs.sort(key=lambda rung: -rung["gain"])
-    return [r for k, r in enumerate(rungs) if k < RUNGS or r["chosen"] or r["gain"] == 0.0]
+    rows.sort(key=lambda row: -row["gain"])
+    return [r for k, r in enumerate(rows) if k < EXPLANATIONS or r["chosen"] or r["gain"] == 0.0]
 
 
 def _remainder(document: dict, scores: list[dict]) -> dict:

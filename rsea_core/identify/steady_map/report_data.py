@@ -11,7 +11,7 @@ from rsea_core.recordings.case import Case
 from rsea_core.recordings.finding import Finding, grouped_sentences
 
 SIGNAL = "motor_torque_Nm"
-RUNGS = 8
+EXPLANATIONS = 8
 SENTENCES = {
     GearFriction.effect: GearFriction.headline,
     GearLoadFriction.effect: GearLoadFriction.headline,
@@ -61,7 +61,7 @@ def map_report_data(
                                  "rmse_parameters_only", "rmse_after")}
             for row in document["fit"]["recordings"]
         ],
-        "ladder": [_rung(fit, chosen, plain, n) for fit in fits[:RUNGS]],
+        "ladder": [_explanation(fit, chosen, plain, n) for fit in fits[:EXPLANATIONS]],
         "laws": [_curve(p, chosen)],
         "remainder": {
             "words": "What is left of the motor's torque at speeds that took no part.",
@@ -95,8 +95,8 @@ def _effect(e: Mapping) -> dict:
     }  # fmt: skip
 
 
-def _rung(fit: MapFit, chosen: MapFit, plain: MapFit, n: int) -> dict:
-    """A law on the ladder: its gain over viscous friction alone, in log-likelihood."""
+def _explanation(fit: MapFit, chosen: MapFit, plain: MapFit, n: int) -> dict:
+    """A law that was compared: its gain over viscous friction alone, in log-likelihood."""
     gain = n * np.log(plain.score / fit.score)
     return {
         "name": fit.law.name, "subsystem": "gear", "error": fit.score,

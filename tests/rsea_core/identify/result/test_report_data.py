@@ -72,15 +72,15 @@ def test_account_names_the_place_and_shows_held_out_recordings_first(shown, diag
     assert any("gear's" in line for line in shown["signatures"])
 
 
-def test_ladder_has_the_choice_and_parameters_alone(shown):
-    names = [rung["name"] for rung in shown["ladder"]]
-    chosen = [rung for rung in shown["ladder"] if rung["chosen"]]
+def test_ranked_explanations_have_the_choice_and_parameters_alone(shown):
+    names = [row["name"] for row in shown["ladder"]]
+    chosen = [row for row in shown["ladder"] if row["chosen"]]
     assert "parameters only" in names
     assert len(chosen) == 1
-    assert chosen[0]["gain"] == max(rung["gain"] for rung in shown["ladder"])
+    assert chosen[0]["gain"] == max(row["gain"] for row in shown["ladder"])
 
 
-def test_alternatives_are_the_ladder_seen_from_the_choice(shown, diagnosis):
+def test_alternatives_are_the_ranked_explanations_seen_from_the_choice(shown, diagnosis):
     effect = diagnosis.document["effects"][0]
     listed = effect["alternatives"]
     behind = [a["delta_score"] for a in listed]
@@ -88,16 +88,16 @@ def test_alternatives_are_the_ladder_seen_from_the_choice(shown, diagnosis):
     assert behind == sorted(behind)
     assert {a["name"] for a in listed}.isdisjoint({effect["name"]})
     assert {bool(a.get("screened")) for a in listed} == {True, False}
-    rungs = {rung["name"]: rung for rung in shown["ladder"]}
-    chosen = rungs[effect["name"]]
-    assert rungs["parameters only"]["gain"] == pytest.approx(0.0, abs=1e-9)
-    met = [a for a in listed if a["name"] in rungs]
+    rows = {row["name"]: row for row in shown["ladder"]}
+    chosen = rows[effect["name"]]
+    assert rows["parameters only"]["gain"] == pytest.approx(0.0, abs=1e-9)
+    met = [a for a in listed if a["name"] in rows]
     assert len(met) > 2
     for a in met:
-        rung = rungs[a["name"]]
-        assert chosen["gain"] - rung["gain"] == pytest.approx(a["delta_score"], abs=0.06)
-        assert rung["se"] == pytest.approx(a["se"], abs=0.06)
-        assert rung["note"].endswith("not fitted") == bool(a.get("screened"))
+        row = rows[a["name"]]
+        assert chosen["gain"] - row["gain"] == pytest.approx(a["delta_score"], abs=0.06)
+        assert row["se"] == pytest.approx(a["se"], abs=0.06)
+        assert row["note"].endswith("not fitted") == bool(a.get("screened"))
 
 
 def test_two_fits_make_an_experiment_that_a_bench_can_run(diagnosis):
