@@ -5,9 +5,10 @@ free runs on the bench, by windows anywhere else. Free runs over whole recording
 machine holds them: the bench, with a duty to a bridge, every sensor and rows of a millisecond
 (`is_bench`). Everywhere else laws are judged by predictions over windows with estimated starts and
 an estimated noise (`multistep`). Where that leaves dependent innovations or finds no name - no law
-fits the machine quite - free runs are a second opinion, and the model that predicts the recordings
-held out better speaks. The bench asks windows so where its free runs find no name, names that leave
-much, or one that an amplifier's offset imitates: free runs do not model the errors of a log.
+fits the machine quite - free runs are a second opinion, and the diagnosis whose model predicts
+clearly better is taken (`_better`). On the bench windows are asked in the same way where free runs
+find no name, names that leave much, or one that an amplifier's offset imitates: free runs do not
+model the errors of a log.
 """
 
 from collections.abc import Callable

@@ -209,7 +209,7 @@ class WindowVerdict(Conclusion):
         if self.verdict != "unexplained":
             named = {e["name"] for e in found}
             extra = [e for e in (self.unbalance, self.delayed) if e is not None]
-            if found and self.unbalance is not None:  # values that a law bends are no effect
+            if found and self.unbalance is not None:  # values that a law biases are no effect
                 extra[0] = extra[0] | {"confidence": min(extra[0]["confidence"], UNCLAIMED)}
             if self.verdict == "insufficient-data":
                 extra = []

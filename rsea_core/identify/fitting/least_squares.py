@@ -212,8 +212,8 @@ class _Descent:
         return columns
 
     def follow(self, columns: Sequence[NDArray], iterations: int) -> bool:
-        """Step by these differences while they serve; whether the descent has arrived."""
-        fell, arrived = 0.0, True
+        """Step by these differences while they serve; whether the descent has converged."""
+        fell, converged = 0.0, True
         for again in range(1 + self.fitter.reuses):
             before = self._tempered(self.cost, self.x)
             step = self._step(columns, before, reused=again > 0)
@@ -222,13 +222,13 @@ class _Descent:
             moved, came, fall = step
             self.taken += 1
             small = fall < ENOUGH * max(abs(before), 1.0)
-            arrived = small and not again
+            converged = small and not again
             if small or self.taken == iterations or fall < SHARE * fell:
                 break
             fell = fall
             if again < self.fitter.reuses:
                 broyden_update(columns, moved, came, self.here)
-        return arrived
+        return converged
 
     def _step(
         self, columns: Sequence[NDArray], before: float, *, reused: bool

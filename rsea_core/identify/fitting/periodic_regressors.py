@@ -1,6 +1,6 @@
 """Columns of laws that follow the measured motion, through the linear machine.
 
-A torque on the wheel that is periodic in the motor's angle drives a replay out of step with the
+A torque on the wheel that is periodic in the motor's angle makes a replay diverge from the
 recording; no small amplitude in a replay shows it. Fed with the *measured* angle it is a known
 signal at a port, and its innovations follow exactly from the linear machine.
 """

@@ -1,9 +1,9 @@
 """Short runs of every recording from its smoothed motion.
 
-A free run of a machine with dry friction or a torque periodic in an angle soon goes out of step
-with the recording, and then says nothing of the law at hand. A run of half a second that begins at
-the smoothed states stays in step, so that least squares has one basin; what the starts may be
-wrong by enters the whitener as the covariance of its state (fixed-start multiple shooting: Bock,
+A free run of a machine with dry friction or a torque periodic in an angle soon diverges from the
+recording, and then says nothing of the law at hand. A run of half a second that begins at the
+smoothed states does not diverge, so that least squares has one minimum; the error of the starts
+enters the whitener as the covariance of its state (fixed-start multiple shooting: Bock,
 Springer Ser. Chem. Phys. 18 (1981) 102; docs/diagnosis.md 5.3).
 """
 

@@ -2,7 +2,7 @@
 
 The regression is made on innovations, as the screening of named laws (`law_search/screening.py`):
 each function is the response of the linear errors' machine, the free values are projected out, and
-blocks of rows are left out. So noise, closed loops and bent parameters count as they do there.
+blocks of rows are left out. So noise, closed loops and biased parameters count as they do there.
 Taken: the library of SINDy (Brunton, Proctor & Kutz 2016), the stability selection of Meinshausen
 & Buhlmann (2010) over halves of the blocks, as ensemble-SINDy (Fasel et al. 2022) does with it.
 """

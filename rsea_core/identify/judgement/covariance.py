@@ -24,7 +24,7 @@ from rsea_core.identify.judgement.quantisation_error import STEP_LEFT, counts_of
 BLOCK_s = 0.5
 PIECES = 5  # of each recording
 NO_PRIOR = 30.0  # white deviations within which values without a prior may scatter
-LAW_SPREAD = 0.015  # of what a law does: what laws of one effect by different hands differ by
+LAW_SPREAD = 0.015  # of what a law does: error of its form, as between laws of one effect
 LEAST_SQUARE = 1e-9  # of the largest variance: less is round-off
 ALONE = 4.0  # growth of a variance without one recording, above which that recording is needed
 
@@ -142,7 +142,7 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
 
 
 def law_moves(problem: Problem, fit: Fit, pieces: Sequence[NDArray]) -> list[NDArray]:
-    """What pulls (n,) at the unknowns where a law of another hand differs from piece to piece.
+    """Gradients (n,) by the error of a law's form, which differs from piece to piece.
 
     Each number in proportion to which a law acts is off by `LAW_SPREAD` of itself in each piece,
     independently: what all pieces share the law's own numbers take.

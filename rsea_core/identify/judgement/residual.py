@@ -183,7 +183,7 @@ def unexplained_residual(search: Search) -> UnexplainedResidual | None:
         return None
     tried = sorted(
         (fit_jointly(problem, start, e) for e in ranked[: search.effort.signals]),
-        key=lambda b: -b.likelihood,
+        key=lambda b: -b.log_posterior,
     )
     tables = [_table(search, b) for b in tried]
     best = _followed(search, tried, tables) or favoured_by_screening(search, tried)
@@ -194,7 +194,7 @@ def unexplained_residual(search: Search) -> UnexplainedResidual | None:
     subsystem = _subsystem(search, best.ranked, traces)
     found, of_change = _concentrated(search, traces)
     rivals = {
-        _owner(b.ranked.port): best.likelihood - b.likelihood
+        _owner(b.ranked.port): best.log_posterior - b.log_posterior
         for b in reversed(tried)
         if _owner(b.ranked.port) != subsystem and b is not best
     }
@@ -259,7 +259,7 @@ def favoured_by_screening(search: Search, tried: Sequence[JointFit]) -> JointFit
     """
     best = tried[0]
     near = min(ALIKE * best.ranked.gain, PLAIN_TO_SEE)
-    alike = [b for b in tried if best.likelihood - b.likelihood < near]
+    alike = [b for b in tried if best.log_posterior - b.log_posterior < near]
     for candidate in search.candidates:
         for b in alike:
             if candidate.law.subsystem == _owner(b.ranked.port):

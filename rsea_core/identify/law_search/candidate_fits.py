@@ -15,7 +15,6 @@ from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Candidate
 from rsea_core.identify.multistep.criteria import (
     ALONG,
-    ARRIVED,
     CLOSE_TO_RIG,
     EVEN,
     EVENT,
@@ -29,6 +28,7 @@ from rsea_core.identify.multistep.criteria import (
     SETTLED,
     SETTLING,
     STRAINED,
+    UNCONVERGED,
     WIDER,
     WIDER_TIMES,
 )
@@ -136,7 +136,7 @@ def resmoothed_fit(own: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
     smooth(other, fit.hypothesis, fit.x)
     other = other.having([prepared(t) for t in other.tracks])
     again = other.fit(fit.hypothesis, fit.x, iterations=3)
-    if gain_of(other, fit, again) < -ARRIVED:
+    if gain_of(other, fit, again) < -UNCONVERGED:
         other, again = settled(other, again, once=True)
     return likelier((own, fit), (other, again))
 
@@ -147,11 +147,12 @@ def gain_of(own: Estimator, base: Estimate, fit: Estimate, share: float | None =
     Innovations count `share`, or what they count for the better fit (`independent_share`).
     """
     share = own.tempering if share is None else share
-    return share * (base.likelihood - fit.likelihood) + base.prior_cost - fit.prior_cost
+    gain = base.negative_log_likelihood - fit.negative_log_likelihood
+    return share * gain + base.prior_cost - fit.prior_cost
 
 
 def from_prior(estimator: Estimator, fit: Estimate) -> Estimate:
-    """The fit, or one that begins at the rig's values: what lacked a law had bent them."""
+    """The fit, or one that begins at the rig's values: the missing law had biased them."""
     problem = estimator.problem
     count = len(problem.nominals)
     if np.all(np.abs(fit.x[:count]) < FAR_FROM_RIG):
@@ -321,7 +322,7 @@ def widened(c: Candidate, own: Estimator, fit: Estimate) -> tuple[Candidate, Est
 def restarted(finished: list, worth, say) -> list:
     """Rivals of the best candidate fitted once more from its values of everything else.
 
-    What lacked a law had bent the values from which each was fitted, and a fit may stay there.
+    The missing law had biased the values from which each was fitted, and a fit may stay there.
     """
     c, noise, best = finished[0]
     found = [finished[0]]

@@ -185,7 +185,7 @@ class Found:
                        estimator=self.base_estimator)  # fmt: skip
 
     def continue_from(self, estimator: Estimator, fit: Estimate) -> None:
-        """Take a fit of the same laws that arrived further."""
+        """Take a fit of the same laws that converged further."""
         if not self.steps:
             self.base_estimator, self.base = estimator, fit
         self.estimator, self.best = estimator, fit

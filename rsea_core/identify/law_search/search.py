@@ -54,9 +54,8 @@ from rsea_core.identify.law_search.window_lengths import lengthened
 from rsea_core.identify.multistep.command_timing import CommandTiming
 from rsea_core.identify.multistep.criteria import (
     AGAIN,
-    ARRIVALS,
-    ARRIVED,
     CONTENDS,
+    CONTINUATIONS,
     FEWER_FINISHED,
     FINISHED,
     FORMS,
@@ -73,6 +72,7 @@ from rsea_core.identify.multistep.criteria import (
     PULSE_CHOICE,
     PULSE_RATIO,
     SECOND_STARTS,
+    UNCONVERGED,
     WEAK,
 )
 from rsea_core.identify.multistep.estimator import Estimate, Estimator
@@ -258,12 +258,12 @@ def _ranked(
     """The candidates fitted to their ends, best first, those at a bound, and what was chosen.
 
     Where the best one's values are better ones without its law too, the fit that it was added to
-    had not arrived: these take its place, and laws are screened again. A law is no evidence for
+    had not converged: these take its place, and laws are screened again. A law is no evidence for
     what continuing a fit gains.
     """
     finished: list[Entry] = []
     beyond: list[Entry] = []
-    for arrival in range(1 if quick else ARRIVALS + 1):
+    for continuation in range(1 if quick else CONTINUATIONS + 1):
         choice = promising(found, laws, quick=quick)
         done = {entry[0].law.key for entry in finished + beyond}
         new = [c for c in choice.candidates if c.law.key not in done]
@@ -272,7 +272,7 @@ def _ranked(
         ends, bounds, without = _finished(found, replace(choice, candidates=new), say, quick=quick)
         finished, beyond = finished + ends, beyond + bounds
         finished.sort(key=_worth_over_parent(found, finished), reverse=True)
-        last = quick or arrival == ARRIVALS
+        last = quick or continuation == CONTINUATIONS
         if last or not any(_continued(found, e, finished, say) for e in finished[:1] + without):
             break
     if finished:
@@ -291,9 +291,9 @@ def _continued(found: Found, entry: Entry, finished: Sequence[Entry], say) -> bo
         return False
     owed = gain_of(further[0], found.best, further[1])
     best = _worth_over_parent(found, finished)(finished[0]) if finished else 0.0
-    if owed < max(ARRIVED, OWED * best):
+    if owed < max(UNCONVERGED, OWED * best):
         return False
-    say(f"  the fit before had not arrived: {owed:.1f} without {entry[0].law.key}")
+    say(f"  the fit before had not converged: {owed:.1f} without {entry[0].law.key}")
     found.continue_from(*further)
     return True
 
@@ -303,7 +303,7 @@ def _worth_over_parent(found: Found, finished: Sequence[Entry]) -> Callable[[Ent
     if not finished:
         return lambda entry: 0.0
     # one share for all: two laws that fit alike are alike, however dependent each seems
-    share = min(finished, key=lambda entry: entry[2].likelihood)[1].tempering
+    share = min(finished, key=lambda entry: entry[2].negative_log_likelihood)[1].tempering
     base = found.best
 
     def worth(entry: Entry) -> float:

@@ -47,8 +47,8 @@ class RankedPort:
         "V", "G", "S", "L", "E" or "Y:<column>".
     gain : float
         Log-likelihood units over no unknown signal at all.
-    likelihood : float
-        Log likelihood of the readings, priors included.
+    log_posterior : float
+        Log-likelihood of the readings with log prior, up to a constant.
     pace_s : float
         Correlation time.
     levels : (benches,) array
@@ -59,7 +59,7 @@ class RankedPort:
 
     port: str
     gain: float
-    likelihood: float
+    log_posterior: float
     pace_s: float
     levels: NDArray
     scale: float
@@ -83,10 +83,10 @@ def ranked_ports(problem: Problem, fit: Fit) -> list[RankedPort]:
             for model, r in zip(models, columns, strict=True)
         ]
         value, levels = _most_likely(stats, prior)
-        without, _, _ = profiled_likelihood(stats, [0] * len(stats), prior)
+        without, _, _ = profiled_log_posterior(stats, [0] * len(stats), prior)
         sizes = LEVELS[np.array(levels)] * scale
         return RankedPort(
-            port=name, gain=value - without, likelihood=value, pace_s=pace, levels=sizes,
+            port=name, gain=value - without, log_posterior=value, pace_s=pace, levels=sizes,
             scale=scale,
         )  # fmt: skip
 
@@ -109,8 +109,8 @@ class JointFit:
     x : (n,) array
     covariance : (n, n) array
         Of the unknowns, with the signal's levels as they are.
-    likelihood : float
-        Log likelihood of the readings, priors included.
+    log_posterior : float
+        Log-likelihood of the readings with log prior, up to a constant.
     share : float
         Of the squared innovations above their noise, what the signal takes away.
     """
@@ -118,7 +118,7 @@ class JointFit:
     ranked: RankedPort
     x: NDArray
     covariance: NDArray
-    likelihood: float
+    log_posterior: float
     share: float
 
 
@@ -130,7 +130,7 @@ def fit_jointly(problem: Problem, start: Fit, ranked: RankedPort) -> JointFit:
     """
     prior_mean = np.concatenate([np.zeros(len(problem.nominals)), start.x[len(problem.nominals) :]])
     found = [_relaxed(problem, start.hypothesis, x, ranked) for x in (start.x, prior_mean)]
-    return max(found, key=lambda b: b.likelihood)
+    return max(found, key=lambda b: b.log_posterior)
 
 
 def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, ranked: RankedPort) -> JointFit:
@@ -155,16 +155,16 @@ def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, ranked: Ranke
             )
         prior = _prior(problem, at)
         value, levels = _most_likely(stats, prior)
-        _, move, covariance = profiled_likelihood(stats, levels, prior)
+        _, move, covariance = profiled_log_posterior(stats, levels, prior)
         here = value - 0.5 * _fall(stats, levels, move, prior)
-        if best is not None and not here > best.likelihood:
+        if best is not None and not here > best.log_posterior:
             trial = 0.5 * (best.x + trial)
             continue
-        gained = np.inf if best is None else here - best.likelihood
+        gained = np.inf if best is None else here - best.log_posterior
         sizes = LEVELS[np.array(levels)] * scale
         best = JointFit(
-            ranked=replace(ranked, levels=sizes), x=trial, covariance=covariance, likelihood=here,
-            share=_taken_away(stats, levels, readings),
+            ranked=replace(ranked, levels=sizes), x=trial, covariance=covariance,
+            log_posterior=here, share=_taken_away(stats, levels, readings),
         )  # fmt: skip
         if gained < SETTLED:
             break
@@ -231,8 +231,8 @@ def _statistics(
     return dets, grams
 
 
-def profiled_likelihood(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
-    """Log likelihood at given levels, the unknowns at their best; their move and covariance."""
+def profiled_log_posterior(stats, at: Sequence[int], prior) -> tuple[float, NDArray, NDArray]:
+    """Log posterior at given levels, the unknowns at their best; their move and covariance."""
     prior_weight, offset = prior
     det = sum(s[0][j] for s, j in zip(stats, at, strict=True))
     G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
@@ -244,7 +244,7 @@ def profiled_likelihood(stats, at: Sequence[int], prior) -> tuple[float, NDArray
 
 
 def _fall(stats, at: Sequence[int], move: NDArray, prior) -> float:
-    """By how much twice the negative log likelihood falls over a move to its least."""
+    """By how much twice the negative log posterior falls over a move to its least."""
     prior_weight, offset = prior
     G = sum(s[1][j] for s, j in zip(stats, at, strict=True))
     return -float((G[1:, 0] + prior_weight * offset) @ move)
@@ -266,7 +266,7 @@ def _most_likely(stats, prior) -> tuple[float, list[int]]:
         before = value
         for b in range(len(stats)):
             tried = [
-                profiled_likelihood(stats, [*at[:b], j, *at[b + 1 :]], prior)[0]
+                profiled_log_posterior(stats, [*at[:b], j, *at[b + 1 :]], prior)[0]
                 for j in range(LEVELS.size)
             ]
             at[b] = int(np.argmax(tried))

@@ -57,17 +57,17 @@ def explained_better_by_other_port(problem: Problem, parameters: Fit, fit: Fit) 
     """
     own = {port for law in fit.hypothesis.laws for port in _own(law)}
     without = ranked_ports(problem, parameters)
-    mine = max((e.likelihood for e in without if e.port in own), default=-np.inf)
+    mine = max((e.log_posterior for e in without if e.port in own), default=-np.inf)
     others = [
         e for e in without
-        if e.port not in own and e.gain > 0.0 and e.likelihood - mine > ALIKE * e.gain
+        if e.port not in own and e.gain > 0.0 and e.log_posterior - mine > ALIKE * e.gain
     ]  # fmt: skip
     if not others:
         return False
     ranked = ranked_ports(problem, fit)
-    alone = ranked[0].likelihood - ranked[0].gain
-    named = max((alone, *(e.likelihood for e in ranked if e.port in own)))
-    return fit_jointly(problem, parameters, others[0]).likelihood > named
+    alone = ranked[0].log_posterior - ranked[0].gain
+    named = max((alone, *(e.log_posterior for e in ranked if e.port in own)))
+    return fit_jointly(problem, parameters, others[0]).log_posterior > named
 
 
 def _own(law: Law) -> tuple[str, ...]:

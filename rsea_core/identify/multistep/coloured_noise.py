@@ -33,7 +33,7 @@ def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say)
     residuals = [r[0] for r in estimator.residuals([(h, x)])]
     if not all(np.all(np.isfinite(r)) for r in residuals):
         return estimator
-    best, least = estimator, _likelihood(estimator, h, x) + COLOUR_GAIN
+    best, least = estimator, _log_posterior(estimator, h, x) + COLOUR_GAIN
     for rows in COLOUR_ROWS:
         time = rows * max(t.experiment.recording.sample_time_s for t in estimator.tracks)
         if not all(_tells(t, time) for t in estimator.tracks):
@@ -42,11 +42,11 @@ def with_coloured_readings(estimator: Estimator, h: Hypothesis, x: NDArray, say)
             own = estimator.having(
                 estimated_noise([_coloured(t, time, share) for t in estimator.tracks], residuals)
             )
-            likelihood = _likelihood(own, h, x)
-            if likelihood > least + (0.0 if best is estimator else SHORTER):
-                best, least = own, likelihood
+            log_posterior = _log_posterior(own, h, x)
+            if log_posterior > least + (0.0 if best is estimator else SHORTER):
+                best, least = own, log_posterior
     if best is not estimator:
-        gain = least - _likelihood(estimator, h, x)
+        gain = least - _log_posterior(estimator, h, x)
         time = best.tracks[0].noise.colour_time_s
         say(f"coloured readings, time constant {time:.3g} s: {gain:.1f} units likelier")
     return best
@@ -64,7 +64,7 @@ def _coloured(t: Track, time_s: float, share: float) -> Track:
     return prepared(t, noise=noise)
 
 
-def _likelihood(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
-    """Log-likelihood of all rows, not tempered."""
+def _log_posterior(estimator: Estimator, h: Hypothesis, x: NDArray) -> float:
+    """Log-likelihood of all rows, not tempered, and of the prior."""
     plain = Estimator(estimator.problem, estimator.tracks, cache=estimator.cache)
     return -float(plain.costs([(h, x)])[0])

@@ -40,18 +40,18 @@ class Estimate:
     x : (n,) array
     cost : float
         Tempered negative log-likelihood and priors.
-    likelihood, prior_cost : float
-        Negative log-likelihood, not tempered, and half the priors' squares.
-    arrived : bool
+    negative_log_likelihood, prior_cost : float
+        Not tempered, robust (`huber_squares`), up to a constant; half the priors' squares.
+    converged : bool
         Whether the last step no longer lowered it.
     """
 
     hypothesis: Hypothesis
     x: NDArray
     cost: float
-    likelihood: float
+    negative_log_likelihood: float
     prior_cost: float
-    arrived: bool
+    converged: bool
 
 
 @dataclass
@@ -207,7 +207,7 @@ class Estimator:
 
         Simulations for a Jacobian are most of the work. As long as steps lower the cost as
         foreseen, the Jacobian is corrected by what they change (Broyden, Math. Comp. 19 (1965)
-        577) and not taken anew; only a fit that gains nothing by a new one has arrived.
+        577) and not taken anew; only a fit that gains nothing by a new one has converged.
 
         Parameters
         ----------
@@ -225,8 +225,8 @@ class Estimator:
         """
         x = np.clip(x, *self.problem.bounds(h))
         cost = self.costs([(h, x)])[0]
-        damping, arrived, taken = 1e-3, False, 0
-        while taken < iterations and np.isfinite(cost) and not arrived:
+        damping, converged, taken = 1e-3, False, 0
+        while taken < iterations and np.isfinite(cost) and not converged:
             level, columns = self.jacobian(h, x, fine=fine, shared=shared)
             needed = cost - target_cost
             if needed > 0.0 and needed > largest_decrease(self, h, x, level, columns):
@@ -236,13 +236,13 @@ class Estimator:
             if shared is not None:
                 little = cost - end.cost < least_decrease(cost)
                 shared = None if little else [J[: len(s)] for J, s in zip(end.columns, shared)]
-            x, cost, damping, arrived, _ = end
+            x, cost, damping, converged, _ = end
             taken += 1
         centre, weight = self.problem.prior(h)
         prior_cost = 0.5 * float(np.sum((weight * (x - centre)) ** 2))
         return Estimate(
-            hypothesis=h, x=x, cost=float(cost), arrived=arrived, prior_cost=prior_cost,
-            likelihood=float(cost - prior_cost) / self.tempering,
+            hypothesis=h, x=x, cost=float(cost), converged=converged, prior_cost=prior_cost,
+            negative_log_likelihood=float(cost - prior_cost) / self.tempering,
         )  # fmt: skip
 
 

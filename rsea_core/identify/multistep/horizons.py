@@ -219,7 +219,7 @@ def _grown(
 def likelier(*ends: tuple[Estimator, Estimate]) -> tuple[Estimator, Estimate]:
     """The likelier of some fits, at one share of independent innovations."""
     share = min(own.tempering for own, _ in ends)
-    return min(ends, key=lambda end: share * end[1].likelihood + end[1].prior_cost)
+    return min(ends, key=lambda end: share * end[1].negative_log_likelihood + end[1].prior_cost)
 
 
 def _in_own_noise(estimator: Estimator, fit: Estimate) -> tuple[Estimator, Estimate]:
@@ -244,7 +244,7 @@ def _from_output_error(
 def with_best_delay(estimator: Estimator, h: Hypothesis, x: NDArray) -> Estimate:
     """A fit whose delay began where the cost is lowest.
 
-    A late command turns in phase: from a wrong delay a fit bends the machine's values instead.
+    A late command is an error of phase: from a wrong delay a fit biases the machine's values.
     """
     names = estimator.problem.names(h)
     tried = [estimator.fit(h, x, iterations=DELAY_FIT)]

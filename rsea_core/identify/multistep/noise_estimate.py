@@ -52,10 +52,10 @@ def estimated_noise(
     if tracks[0].noise.colours.size:
         keys += [("colour", c) for c in read]
     noises = [t.noise for t in tracks]
-    values = _likelihoods(parts, noises)
+    values = _log_likelihoods(parts, noises)
     results = [_descended(parts, tracks, keys, steps, values, noises)]
     starts = [[_of_fast_changes(p, share) for p in parts] for share in QUIETER]
-    likely = [_likelihoods(parts, trial) for trial in starts]
+    likely = [_log_likelihoods(parts, trial) for trial in starts]
     best = max(range(len(starts)), key=lambda j: sum(likely[j]))
     if sum(likely[best]) > sum(values):
         results.append(_descended(parts, tracks, keys, steps, likely[best], starts[best]))
@@ -71,7 +71,7 @@ class _Block:
     rows: slice
     residual: NDArray
 
-    def likelihood(self, noise: Noise) -> float:
+    def log_likelihood(self, noise: Noise) -> float:
         """Log-likelihood under a noise, robust."""
         t, rows = self.track, self.rows
         errors = with_density(t.errors, noise)
@@ -96,14 +96,14 @@ def _descended(
     parts: Sequence[_Block], tracks: Sequence[Track], keys: Sequence[tuple],
     steps: Sequence[float], values: list[float], noises: list[Noise],
 ) -> tuple[float, list[Noise]]:  # fmt: skip
-    """Likelihood and noises after a coordinate search from given noises."""
+    """Log-likelihood and noises after a coordinate search from given noises."""
     for factor in steps:
         for key in keys:
             for up in (factor, 1.0 / factor):
                 moved = False
                 for _ in range(12):
                     trial = [_scaled(t, n, key, up) for t, n in zip(tracks, noises, strict=True)]
-                    found = _likelihoods(parts, trial)
+                    found = _log_likelihoods(parts, trial)
                     if not sum(found) > sum(values) + 0.1:
                         break
                     values, noises, moved = found, trial, True
@@ -112,13 +112,13 @@ def _descended(
     return sum(values), noises
 
 
-def _likelihoods(parts: Sequence[_Block], noises: Sequence[Noise]) -> list[float]:
+def _log_likelihoods(parts: Sequence[_Block], noises: Sequence[Noise]) -> list[float]:
     """Log-likelihood of each part under its noise, on threads."""
     found = [0.0] * len(parts)
 
     def run(begin: int, end: int) -> None:
         for j in range(begin, end):
-            found[j] = parts[j].likelihood(noises[j])
+            found[j] = parts[j].log_likelihood(noises[j])
 
     share_out(run, len(parts))
     return found

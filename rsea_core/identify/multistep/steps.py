@@ -13,7 +13,7 @@ LONGEST_STEP = 3.0
 UNDAMPED = 1e-12  # damping of a step along directions that only the priors determine
 PROBE = 0.1  # share of such a step by which its second derivative is taken
 SHARES = (1.0, 0.5, 0.25, 0.1)  # of such a step that are tried
-ENOUGH = 1e-5  # relative fall of the cost below which a fit has arrived
+ENOUGH = 1e-5  # relative fall of the cost below which a fit has converged
 NEGLIGIBLE = 0.05  # units that no step is worth
 FORESEEN = 0.5  # share of the foreseen fall, below which a corrected Jacobian is taken anew
 CORRECTIONS = 4  # of one Jacobian
@@ -207,12 +207,12 @@ class End(NamedTuple):
     x: NDArray
     cost: float
     damping: float
-    arrived: bool
+    converged: bool
     columns: list[NDArray]
 
 
 def least_decrease(cost: float, fine: bool = False) -> float:
-    """Decrease of a cost below which a fit has arrived."""
+    """Decrease of a cost below which a fit has converged."""
     return max(0.0 if fine else ENOUGH * abs(cost), NEGLIGIBLE)
 
 
@@ -225,7 +225,7 @@ def stepped(
     Parameters
     ----------
     all_new : bool
-        Whether all of the Jacobian is new; if not, a fit has not arrived where it gains nothing.
+        Whether all of the Jacobian is new; if not, a fit has not converged where it gains nothing.
     """
     h, x, cost, A, g = begin
     for corrected in range(CORRECTIONS + 1):
@@ -239,9 +239,9 @@ def stepped(
             return End(x, cost, damping, fresh and all_new, columns)
         moved, fall = step.x - x, cost - step.cost
         little = fall < least_decrease(cost, fine)
-        arrived = fresh and all_new and little
+        converged = fresh and all_new and little
         if fresh and fall < NEGLIGIBLE:  # the next fit begins where a Jacobian is known
-            return End(x, cost, damping, arrived, columns)
+            return End(x, cost, damping, converged, columns)
         foreseen = -float(g @ moved + 0.5 * moved @ A @ moved)
         x, cost = step.x, step.cost
         if little or fall < FORESEEN * foreseen or corrected == CORRECTIONS:
@@ -251,4 +251,4 @@ def stepped(
             for J, e, after in zip(columns, level, step.innovations, strict=True)
         ]
         level = step.innovations
-    return End(x, cost, damping, arrived, columns)
+    return End(x, cost, damping, converged, columns)

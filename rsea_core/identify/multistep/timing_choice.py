@@ -125,7 +125,7 @@ def _grown_from_output_errors(
 def _ends_alike(a: Growth, b: Growth) -> bool:
     """Whether two growths reach the same horizon with almost the same cost."""
     share = min(a[0].tempering, b[0].tempering)
-    costs = [share * fit.likelihood + fit.prior_cost for _, fit, _ in (a, b)]
+    costs = [share * fit.negative_log_likelihood + fit.prior_cost for _, fit, _ in (a, b)]
     return a[2] == b[2] and abs(costs[0] - costs[1]) < SAME_END
 
 

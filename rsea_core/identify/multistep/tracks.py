@@ -303,7 +303,7 @@ def resmoothed(track: Track, run: NDArray, residual: NDArray) -> Track:
     """The track with the motion that a run and what it leaves of the readings show.
 
     Its windows keep their starts, which new ones (`with_windows`) take from that motion: starts
-    that are smoothed with each law bend to what the model lacks, and dry friction is not seen.
+    that are smoothed with each law take up what the model lacks, and dry friction is not seen.
 
     Parameters
     ----------

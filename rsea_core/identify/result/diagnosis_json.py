@@ -155,19 +155,19 @@ def residual_entry(conclusion: Conclusion) -> dict | None:
 
 
 def summary(conclusion: Conclusion) -> str:
-    """One or two sentences that a person can act on, what must be mended before the rest.
+    """One or two sentences that a person can act on, what must be corrected before the rest.
 
-    Physics that was found speaks first: some of it makes readings contradict each other.
+    Physics that was found is stated first: some of it makes readings contradict each other.
     """
     errors, text = conclusion.data_errors(), summary_of(conclusion)
     if not errors:
         return text
     more = f" ({len(errors) - 1} more in the findings)" if len(errors) > 1 else ""
     end = "" if errors[0].is_question and not more else "."
-    mend = f"irst correct what is wrong in the files: {errors[0].sentence()}{more}{end}"
+    correct = f"irst correct what is wrong in the files: {errors[0].sentence()}{more}{end}"
     if conclusion.verdict == "missing-physics":
-        return f"{text} But f{mend}"
-    return f"F{mend} As the files are: {text}"
+        return f"{text} But f{correct}"
+    return f"F{correct} As the files are: {text}"
 
 
 def findings_of(conclusion: Conclusion) -> list[Finding]:

@@ -30,7 +30,8 @@ DOUBTFUL_GAIN, FALSE_ALARMS = 80.0, 0.01
 # a bridge repeats itself less well than the noise of the replays says: where parameters alone are
 # near the noise, nulls have gained up to 70 (a load encoder's half count is one such gain)
 NEAR_NOISE_MSNI, UNREPEATABLE_GAIN = 1.6, 80.0
-# a further effect must take away most of what the first one left, or it only mends its law
+# a further effect must take away most of what the first one left, or it only compensates an error
+# of that law
 LEFT_MOST, LEFT_SOMEWHERE, UNREACHABLE = 0.7, 0.4, 0.9
 SHARE_OF_ALL, LEFT_CLEAR = 0.05, 0.3  # and be a part of the whole, or leave almost nothing
 FREE_RUN_WORSE = 1e-3

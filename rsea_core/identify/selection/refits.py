@@ -50,7 +50,7 @@ def finish(search: Search, rough: Fit, leader: float = -np.inf) -> Fit:
 def settle(search: Search, fit: Fit, say) -> Fit:
     """The fit run on until it no longer gains, from where it is and from the nominal values.
 
-    What a fit that has not arrived leaves would be taken for a further effect.
+    What a fit that has not converged leaves would be taken for a further effect.
     """
     best, n = fit, len(search.problem.nominals)
     prior_mean = np.concatenate([np.zeros(n), fit.x[n:]])
@@ -112,7 +112,7 @@ def with_richer_laws(search: Search, fit: Fit, laws: dict[str, Law], done: set[s
             search.keep(rich)
         rich = search.fits[hypothesis.key]
         behind = search.score(best) + PRICE - search.score(rich)
-        # one that has not arrived looks no better than a simpler one
+        # one that has not converged looks no better than a simpler one
         if search.effort.from_prior and 0.0 <= behind < CLOSE:
             rich = search.keep(finish(search, rich))
         say(f"  richer {key}: MSNI {formatted(rich.msni)}, score {search.score(rich):.1f}")

@@ -202,7 +202,7 @@ def _best_start(linear: _Linear, law: Law, columns: dict[tuple, NDArray]) -> Can
 def _refined(c: Candidate, far: float, linear: _Linear, periodic: NDArray) -> Candidate:
     """A wave's amplitudes and the unknowns with it, by reweighted least squares.
 
-    The weights of a replay that is out of step say nothing; those of what the wave leaves do.
+    The weights of a replay that has diverged say nothing; those of what the wave leaves do.
     """
     e0 = linear.level
     rows = np.concatenate([np.nan_to_num(linear.raw), periodic])

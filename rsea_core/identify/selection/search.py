@@ -160,9 +160,9 @@ def _further_effects(search: Search, best: Fit, laws: dict[str, Law], say, most:
 def leaves_more_than_noise(search: Search, fit: Fit) -> bool:
     """Whether laws leave more than noise of a recording, in its free run and in short ones.
 
-    Where a joint sticks or a torque follows the motor's angle, a law that is all but right still
-    throws a free run out of step, and much that bends the machine mends that run. Physics that is
-    not there at all is missing from short runs too.
+    Where a joint sticks or a torque follows the motor's angle, a free run with a nearly right law
+    still diverges from the recording, and many wrong laws reduce that error. Physics that the law
+    lacks is missing in short runs too.
     """
     return room(search, fit) and bool(np.any((fit.msni > ROOM) & (search.short_msni(fit) > ROOM)))
 
@@ -194,11 +194,11 @@ def restores_prior(search: Search, base: Fit, fit: Fit) -> bool:
 def gains_in_short_runs(search: Search, base: Fit, fit: Fit, say) -> bool:
     """Whether a further effect is worth as much in short runs.
 
-    What it brings to free runs alone is runs that were out of step and came back. Not asked of a
+    A gain in free runs alone may be that of runs that had diverged and no longer do. Not asked of a
     sensor, whose readings short runs begin at, nor where every free run comes down to the noise. Of
-    a part that swings by itself short runs do not know where it is when they begin: it must better
-    every free run that has more than noise, and bring the parameters nearer to their priors. What
-    brings one run back into step by chance does neither.
+    a part that swings by itself short runs do not know where it is when they begin: it must reduce
+    the error of every free run that has more than noise, and bring the parameters nearer to their
+    priors. An effect that stops one run from diverging by chance does neither.
     """
     last = fit.hypothesis.laws[-1]
     if last.sensor is not None or not room(search, fit):
@@ -265,7 +265,7 @@ def _add(
     effort, further = search.effort, bool(base.hypothesis.laws)
     open_laws = _open_laws(search, base, laws)
     found: list[Candidate] = []
-    # a free run that is far out of step says little of what comes next
+    # a free run that has diverged says little of what comes next
     if not (further and effort.contented and np.median(base.msni) > ROUGH_MSNI):
         tempering = tempering_of(base.msni)
         found = screen(search.fitter, base.hypothesis, base.x, open_laws, tempering=tempering)

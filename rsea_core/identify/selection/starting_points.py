@@ -26,7 +26,7 @@ LEFT_FROM_PRIOR = (
     0.7  # of the parameters' prior cost, with a law that may return them to their priors
 )
 LEAST_DROP = 4.0  # log-likelihood units that the screening must predict
-NEAR = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15)  # of a value that a fit out of step has found
+NEAR = (0.85, 0.9, 0.95, 1.0, 1.05, 1.1, 1.15)  # of a value that a fit whose run diverged has found
 ALIGNED = 0.8  # of the cost at the nominal values: what a start must leave to have met a valley
 
 

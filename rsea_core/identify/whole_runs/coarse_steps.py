@@ -36,4 +36,4 @@ def in_coarse_steps(own: Estimator, fit: Estimate, left: float) -> Estimator:
 def with_costs_of(own: Estimator, fit: Estimate) -> Estimate:
     """A fit with the costs that another estimator gives its values."""
     cost = float(own.costs([(fit.hypothesis, fit.x)])[0])
-    return replace(fit, cost=cost, likelihood=(cost - fit.prior_cost) / own.tempering)
+    return replace(fit, cost=cost, negative_log_likelihood=(cost - fit.prior_cost) / own.tempering)

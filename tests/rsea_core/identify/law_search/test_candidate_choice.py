@@ -117,16 +117,16 @@ def test_a_law_with_no_size_moves_no_prediction(dry_friction):
     assert absent(c, own, own.fit(fit.hypothesis, x, iterations=0))
 
 
-def test_a_fit_that_was_stopped_is_continued_and_one_that_arrived_is_not(dry_friction):
+def test_a_fit_that_was_stopped_is_continued_and_one_that_converged_is_not(dry_friction):
     found, c, own, fit = friction_fit(dry_friction)
     x = found.best.x.copy()
     x[0] += 3.0  # three tolerances off
     stopped = found.estimator.fit(found.best.hypothesis, x, iterations=0)
     further = continued_parent(stopped, (c, own, fit))
     assert gain_of(further[0], stopped, further[1]) > 4.0
-    arrived = settled(found.estimator, found.best, once=True)
-    again = continued_parent(arrived[1], (c, own, fit))
-    assert again is None or gain_of(again[0], arrived[1], again[1]) < 4.0
+    converged = settled(found.estimator, found.best, once=True)
+    again = continued_parent(converged[1], (c, own, fit))
+    assert again is None or gain_of(again[0], converged[1], again[1]) < 4.0
 
 
 def test_one_angle_alone_shows_no_offset_no_factor_and_no_reading_that_is_late(dry_friction):

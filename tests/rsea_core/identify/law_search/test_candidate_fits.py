@@ -24,9 +24,9 @@ from rsea_core.identify.multistep.experiment import Hypothesis, MultistepProblem
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig, pendulum_case
 
 
-def estimate(likelihood: float) -> Estimate:
-    return Estimate(hypothesis=Hypothesis(), x=np.zeros(1), cost=likelihood,
-                    likelihood=likelihood, prior_cost=0.0, arrived=True)  # fmt: skip
+def estimate(cost: float) -> Estimate:
+    return Estimate(hypothesis=Hypothesis(), x=np.zeros(1), cost=cost,
+                    negative_log_likelihood=cost, prior_cost=0.0, converged=True)  # fmt: skip
 
 
 def test_two_fits_that_are_as_likely_gain_alike_at_one_share():

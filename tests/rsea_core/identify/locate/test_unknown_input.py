@@ -17,7 +17,7 @@ from rsea_core.identify.locate.unknown_input import (
     LEVELS,
     fit_jointly,
     model_of,
-    profiled_likelihood,
+    profiled_log_posterior,
     ranked_ports,
     smoothed_signal,
 )
@@ -66,10 +66,10 @@ def test_profiling_the_unknowns_out_is_the_best_over_all_of_them():
         left = rows[:, 0] + rows[:, 1:] @ move
         return -0.5 * (2.0 + left @ left + np.sum(prior[0] * (prior[1] + move) ** 2))
 
-    likelihood, move, covariance = profiled_likelihood(stats, [0], prior)
-    assert likelihood == pytest.approx(value(move))
+    log_posterior, move, covariance = profiled_log_posterior(stats, [0], prior)
+    assert log_posterior == pytest.approx(value(move))
     for step in 1e-3 * rng.standard_normal((20, 3)):
-        assert value(move + step) < likelihood
+        assert value(move + step) < log_posterior
     np.testing.assert_allclose(
         np.linalg.inv(covariance), rows[:, 1:].T @ rows[:, 1:] + np.diag(prior[0])
     )
@@ -155,7 +155,7 @@ def test_an_effect_that_leaves_a_large_part_of_the_mismatch_alone_is_not_the_ans
 def test_of_two_places_the_likelier_is_the_one_where_readings_tell_them_apart(behind, taken):
     gain = 5e6
     tried = [
-        SimpleNamespace(ranked=SimpleNamespace(port=port, gain=gain), likelihood=-gap)
+        SimpleNamespace(ranked=SimpleNamespace(port=port, gain=gain), log_posterior=-gap)
         for port, gap in (("S", 0.0), ("Y:motor_angle_rad", behind))
     ]
     liked = SimpleNamespace(law=SimpleNamespace(subsystem="sensor:motor_angle_rad"))

@@ -1,4 +1,4 @@
-"""A fit that says that it has arrived is at its optimum, with few simulations."""
+"""A fit that says that it has converged is at its optimum, with few simulations."""
 
 import numpy as np
 import pytest
@@ -35,9 +35,9 @@ def fitted(case, off: float = 0.0, target_cost: float = np.inf):
     return estimator, estimator.fit(h, x, iterations=30, target_cost=target_cost), len(taken)
 
 
-def test_a_fit_that_has_arrived_has_no_slope_and_a_second_fit_gains_nothing(case):
+def test_a_fit_that_has_converged_has_no_slope_and_a_second_fit_gains_nothing(case):
     estimator, fit, _ = fitted(case)
-    assert fit.arrived
+    assert fit.converged
     again = estimator.fit(fit.hypothesis, fit.x, iterations=30)
     assert fit.cost - again.cost < max(1e-5 * abs(fit.cost), 0.05)
 
@@ -46,8 +46,8 @@ def test_corrected_jacobians_lead_to_the_same_optimum_with_fewer_new_ones(case, 
     _, fit, taken = fitted(case, off=3.0)
     monkeypatch.setattr(steps_module, "CORRECTIONS", 0)
     _, plain, each_step = fitted(case, off=3.0)
-    assert fit.arrived
-    assert plain.arrived
+    assert fit.converged
+    assert plain.converged
     assert abs(fit.cost - plain.cost) < max(1e-5 * abs(fit.cost), 0.05)
     assert taken < each_step
 
@@ -71,8 +71,8 @@ def test_shared_derivatives_lead_to_the_same_optimum_with_fewer_new_ones(case):
         estimator.fit(h, x, iterations=3, shared=given)
         ends.append((sum(new), estimator.fit(h, x, iterations=30, shared=given)))
     (all_new, best), (fewer, other) = ends
-    assert best.arrived
-    assert other.arrived
+    assert best.converged
+    assert other.converged
     assert abs(best.cost - other.cost) < max(1e-5 * abs(best.cost), 0.05)
     assert fewer < all_new
 
@@ -82,7 +82,7 @@ def test_a_fit_that_cannot_reach_the_cost_needed_ends_and_one_that_can_is_unchan
     _, other, same = fitted(case, off=3.0, target_cost=fit.cost + 10.0)
     assert (other.cost, same) == (fit.cost, taken)
     _, early, fewer = fitted(case, off=3.0, target_cost=fit.cost - 1e6)
-    assert not early.arrived
+    assert not early.converged
     assert fewer == 1 < taken
 
 

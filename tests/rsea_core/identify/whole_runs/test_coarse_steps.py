@@ -40,4 +40,4 @@ def test_a_fit_of_coarse_steps_is_judged_in_fine_ones(axis):
     coarse = in_coarse_steps(own, plain, np.inf)
     fit = with_costs_of(own, coarse.fit(plain.hypothesis, plain.x, iterations=2))
     assert fit.cost == own.costs([(fit.hypothesis, fit.x)])[0]
-    assert fit.cost == pytest.approx(own.tempering * fit.likelihood + fit.prior_cost)
+    assert fit.cost == pytest.approx(own.tempering * fit.negative_log_likelihood + fit.prior_cost)

@@ -88,7 +88,8 @@ def test_a_fit_along_the_common_factor_of_all_torques_returns_to_the_rig_file(tu
         more = (FACTOR * p.at(x[j]) - p.value) / p.tolerance if p.additive else None
         x[j] = x[j] + np.log(FACTOR) / p.tolerance if more is None else more
     far = own.fit(best.hypothesis, x, iterations=0)
-    assert far.likelihood == pytest.approx(best.likelihood, abs=1.0)  # the readings do not tell
+    likeliest = best.negative_log_likelihood
+    assert far.negative_log_likelihood == pytest.approx(likeliest, abs=1.0)  # readings do not tell
     found = refitted_from_rig(own, far)
     assert found.cost < far.cost
     assert np.max(np.abs(found.x[: len(own.problem.nominals)])) < 1.0
