@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 import rsea_core.effects.layout as e
 from rsea_core.effects.variant import TrialMachine
 from rsea_core.identify.fitting.cross_validation import WindowedProblem, fit_windows
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
+from rsea_core.identify.fitting.problem import (
+    Hypothesis,
+    PreparedRecording,
+    Problem,
+    predict_readings,
+)
 from rsea_core.identify.fitting.window_predictions import Cut, predict_many
 
 PARTS = 4  # of a record: the cycles of EMPS
@@ -67,31 +72,33 @@ def wandering(problem: Problem, piece: Cut, hypothesis: Hypothesis, x: NDArray) 
     piece : Cut
         The record, one channel.
     """
-    bench = piece.bench
-    plain = problem.trial_machine(bench, hypothesis, x)
+    prepared = piece.prepared
+    plain = problem.trial_machine(prepared, hypothesis, x)
     size = UNIT * max(plain.fx[e.GEAR_FORWARD], 1e-6)
-    pushed = _pushed(problem, bench, hypothesis, x, size)
+    pushed = _pushed(problem, prepared, hypothesis, x, size)
     runs = predict_many(piece, [plain, pushed], piece.overlapping)
-    bounds = np.linspace(0, bench.recording.rows, PARTS + 1)
+    bounds = np.linspace(0, prepared.recording.rows, PARTS + 1)
     forces = []
     for low, high in pairwise(bounds):
         left, slope = [], []
         windows = zip(*runs, piece.overlapping, strict=True)
         for y, z, (first, last) in windows:
             if first >= low and last < high:
-                left.append(bench.measured[first : last + 1, 0] - y[:, 0])
+                left.append(prepared.measured[first : last + 1, 0] - y[:, 0])
                 slope.append((z[:, 0] - y[:, 0]) / size)
         left, slope = np.concatenate(left), np.concatenate(slope)
         forces.append(float(slope @ left / (slope @ slope)))
-    whole = predict_readings(bench.replay, [plain, pushed], bench.channels, bench.where)[:, :, 0]
+    whole = predict_readings(prepared.replay, [plain, pushed], prepared.channels, prepared.where)[
+        :, :, 0
+    ]
     per_force = float(np.sqrt(np.mean((whole[1] - whole[0]) ** 2))) / size
     return Wandering(forces=np.array(forces), per_force=per_force)
 
 
 def _pushed(
-    problem: Problem, bench: Bench, hypothesis: Hypothesis, x: NDArray, size: float
+    problem: Problem, prepared: PreparedRecording, hypothesis: Hypothesis, x: NDArray, size: float
 ) -> TrialMachine:
-    trial = problem.trial_machine(bench, hypothesis, x)
+    trial = problem.trial_machine(prepared, hypothesis, x)
     trial.put(e.GEAR_OFFSET, trial.fx[e.GEAR_OFFSET] - size)  # the offset acts against the motion
     return trial
 
@@ -102,7 +109,7 @@ def halves_held_out(problem: WindowedProblem, hypothesis: Hypothesis, x: NDArray
     The half's run starts from the smoothed motion. First half fitted, then second half fitted.
     """
     ((file, piece),) = problem.cuts.items()
-    rows = piece.bench.recording.rows
+    rows = piece.prepared.recording.rows
     middle, found = rows // 2, []
     for fitted, held in (((0, middle), (middle, rows - 1)), ((middle, rows - 1), (0, middle))):
         w = piece.overlapping
@@ -112,9 +119,9 @@ def halves_held_out(problem: WindowedProblem, hypothesis: Hypothesis, x: NDArray
         finally:
             problem.used[file] = np.ones(len(w), bool)
         run = predict_many(
-            piece, [problem.trial_machine(piece.bench, hypothesis, fit.x)], np.array([held])
+            piece, [problem.trial_machine(piece.prepared, hypothesis, fit.x)], np.array([held])
         )
-        error = run[0][0][:, 0] - piece.bench.measured[held[0] : held[1] + 1, 0]
+        error = run[0][0][:, 0] - piece.prepared.measured[held[0] : held[1] + 1, 0]
         found.append(float(np.sqrt(np.mean(error**2))))
     return found
 

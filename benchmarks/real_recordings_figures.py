@@ -17,7 +17,7 @@ from rsea_core.effects.known_variants import laws_by_key
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.cross_validation import cross_validate, fit_windows, windowed
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording, Problem
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.steady_map.diagnose import diagnose_map
 from rsea_core.identify.steady_map.points import MapLaw, rms
@@ -69,18 +69,18 @@ class Diagnosed:
                 change = value - p.value if p.additive else np.log(value / p.value)
                 self.x[j] = change / p.tolerance
 
-    def run(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> NDArray:
+    def run(self, prepared: PreparedRecording, hypothesis: Hypothesis, x: NDArray) -> NDArray:
         """Simulated readings (rows, channels) of a recording."""
-        return self.problem.predict(bench, hypothesis, x[None])[0]
+        return self.problem.predict(prepared, hypothesis, x[None])[0]
 
-    def before(self, bench: Bench) -> NDArray:
+    def before(self, prepared: PreparedRecording) -> NDArray:
         """As the rig file has it."""
         plain = Hypothesis()
-        return self.run(bench, plain, self.problem.start(plain))
+        return self.run(prepared, plain, self.problem.start(plain))
 
-    def after(self, bench: Bench) -> NDArray:
+    def after(self, prepared: PreparedRecording) -> NDArray:
         """As the diagnosis has it."""
-        return self.run(bench, self.hypothesis, self.x)
+        return self.run(prepared, self.hypothesis, self.x)
 
 
 # ---- EMPS
@@ -89,7 +89,7 @@ class Diagnosed:
 def emps(case: Case, folder: Path, out: Path) -> Section:
     """Chosen on the first record; the second opened for the figure."""
     d = Diagnosed(case, folder)
-    first, test = d.problem.benches
+    first, test = d.problem.prepared
     windows = windowed(d.problem, WINDOW_s)
     laws = catalogue(case)
     rivals = {
@@ -163,32 +163,35 @@ def emps(case: Case, folder: Path, out: Path) -> Section:
 def bam(case: Case, folder: Path, out: Path) -> Section:
     """Open loop and under the servo's own position control."""
     d = Diagnosed(case, folder)
-    gains = _feedback_gains(d.problem.benches)
+    gains = _feedback_gains(d.problem.prepared)
     plain = Hypothesis()
     machines = {"rig file": (plain, d.problem.start(plain)), "found": (d.hypothesis, d.x)}
     table: dict[tuple[str, str, str], list[float]] = {}
-    for bench in d.problem.benches:
+    for prepared in d.problem.prepared:
         for name, (hypothesis, x) in machines.items():
-            opened = d.run(bench, hypothesis, x)[:, 0]
-            closed = closed_loop(d.problem, bench, hypothesis, x, gains[_kp(bench)])
+            opened = d.run(prepared, hypothesis, x)[:, 0]
+            closed = closed_loop(d.problem, prepared, hypothesis, x, gains[_kp(prepared)])
             for loop, angle in (("open", opened), ("closed", closed)):
-                error = float(np.degrees(np.mean(np.abs(angle - bench.measured[:, 0]))))
-                table.setdefault((bench.recording.role, name, loop), []).append(error)
+                error = float(np.degrees(np.mean(np.abs(angle - prepared.measured[:, 0]))))
+                table.setdefault((prepared.recording.role, name, loop), []).append(error)
 
     def mean(role: str, name: str, loop: str) -> float:
         return float(np.mean(table[role, name, loop]))
 
-    held = [b for b in d.problem.benches if b.recording.role == "validation"]
+    held = [b for b in d.problem.prepared if b.recording.role == "validation"]
     figure, axes = plt.subplots(4, 2, figsize=(10, 10), constrained_layout=True, sharex=True)
-    for axis, bench in zip(axes.T.flat, held, strict=True):
-        t = bench.recording.time_s
-        axis.plot(t, np.degrees(bench.measured[:, 0]), color=GREY, lw=2.2, label="recorded")
-        y = np.degrees(d.before(bench)[:, 0])
+    for axis, prepared in zip(axes.T.flat, held, strict=True):
+        t = prepared.recording.time_s
+        axis.plot(t, np.degrees(prepared.measured[:, 0]), color=GREY, lw=2.2, label="recorded")
+        y = np.degrees(d.before(prepared)[:, 0])
         axis.plot(t, y, color=BEFORE, lw=0.8, label="rig file")
-        axis.plot(t, np.degrees(d.after(bench)[:, 0]), color=AFTER, lw=1.2, label="diagnosed")
-        low, high = np.degrees(bench.measured[:, 0]).min(), np.degrees(bench.measured[:, 0]).max()
+        axis.plot(t, np.degrees(d.after(prepared)[:, 0]), color=AFTER, lw=1.2, label="diagnosed")
+        low, high = (
+            np.degrees(prepared.measured[:, 0]).min(),
+            np.degrees(prepared.measured[:, 0]).max(),
+        )
         axis.set_ylim(low - 0.4 * (high - low), high + 0.4 * (high - low))
-        axis.set_title(bench.recording.file.removesuffix(".csv"), fontsize=9)
+        axis.set_title(prepared.recording.file.removesuffix(".csv"), fontsize=9)
     axes[0, 0].legend(fontsize=7, ncols=3)
     figure.supylabel("angle (degrees), open loop from the recorded duty", fontsize=9)
     figure.supxlabel("time (s)", fontsize=9)
@@ -222,38 +225,38 @@ def bam(case: Case, folder: Path, out: Path) -> Section:
     )  # fmt: skip
 
 
-def _kp(bench: Bench) -> int:
-    return int(re.match(r"kp(\d+)_", bench.recording.file).group(1))
+def _kp(prepared: PreparedRecording) -> int:
+    return int(re.match(r"kp(\d+)_", prepared.recording.file).group(1))
 
 
-def _feedback_gains(benches: Sequence[Bench]) -> dict[int, float]:
+def _feedback_gains(recordings: Sequence[PreparedRecording]) -> dict[int, float]:
     """Duty per radian of position error of each firmware gain; they are proportional to it."""
     ratios = []
-    for bench in benches:
-        r = bench.recording
+    for prepared in recordings:
+        r = prepared.recording
         if not r.file.endswith("sin_sin.csv"):
             continue
         t, duty = r.time_s, r["duty"]
         goal = np.sin(t) * np.pi / 2 + 0.5 * np.sin(5 * t) * np.sin(2 * t)
         error = np.concatenate(([0.0], (goal - r["load_angle_rad"])[:-1]))
         free = np.abs(duty) < 0.99
-        ratios.append(float(error[free] @ duty[free] / (error[free] @ error[free])) / _kp(bench))
+        ratios.append(float(error[free] @ duty[free] / (error[free] @ error[free])) / _kp(prepared))
     slope = float(np.median(ratios))
-    return {_kp(bench): slope * _kp(bench) for bench in benches}
+    return {_kp(prepared): slope * _kp(prepared) for prepared in recordings}
 
 
 def closed_loop(
-    problem: Problem, bench: Bench, hypothesis: Hypothesis, x: NDArray, gain: float
+    problem: Problem, prepared: PreparedRecording, hypothesis: Hypothesis, x: NDArray, gain: float
 ) -> NDArray:
     """Load angle (rows,) under duty = gain (goal - angle), one sample late, within -1..1."""
-    r = bench.recording
-    duty, measured, t = r["duty"], bench.measured[:, 0], r.time_s
+    r = prepared.recording
+    duty, measured, t = r["duty"], prepared.measured[:, 0], r.time_s
     late = np.concatenate(([measured[0]], measured[:-1]))
     free = np.abs(duty) < 0.99
     goal = np.interp(t, t[free], (duty / gain + late)[free])
-    trial = problem.trial_machine(bench, hypothesis, x)
+    trial = problem.trial_machine(prepared, hypothesis, x)
     numbers = Numbers(trial.plant, linear_table(trial.stiffness).regions, trial.fx)
-    y = bench.replay.start_state(numbers)
+    y = prepared.replay.start_state(numbers)
     angle = CHANNELS.index("load_angle_rad")
     found, before = np.empty(r.rows), measured[0]
     for row in range(r.rows):
@@ -338,21 +341,21 @@ def flexible_link(case: Case, folder: Path, out: Path) -> Section:
     d = Diagnosed(case, folder)
     errors: dict[tuple[str, str], NDArray] = {}
     figure, axes = plt.subplots(2, 2, figsize=(10, 6), constrained_layout=True, sharex="col")
-    for column, bench in enumerate(d.problem.benches):
-        runs = {"before": d.before(bench), "after": d.after(bench)}
-        spread = np.std(bench.measured, axis=0)
+    for column, prepared in enumerate(d.problem.prepared):
+        runs = {"before": d.before(prepared), "after": d.after(prepared)}
+        spread = np.std(prepared.measured, axis=0)
         for name, y in runs.items():
-            rmse = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0))
-            errors[bench.recording.role, name] = rmse / spread
-        t = bench.recording.time_s
-        for row, (name, per) in enumerate((("gear", bench.where.ratio), ("link", 1.0))):
+            rmse = np.sqrt(np.mean((y - prepared.measured) ** 2, axis=0))
+            errors[prepared.recording.role, name] = rmse / spread
+        t = prepared.recording.time_s
+        for row, (name, per) in enumerate((("gear", prepared.where.ratio), ("link", 1.0))):
             axis = axes[row, column]
             scale = np.degrees(1.0) / per
-            axis.plot(t, scale * bench.measured[:, row], color=GREY, lw=2.2, label="recorded")
+            axis.plot(t, scale * prepared.measured[:, row], color=GREY, lw=2.2, label="recorded")
             axis.plot(t, scale * runs["before"][:, row], color=BEFORE, lw=1.0, label="rig file")
             axis.plot(t, scale * runs["after"][:, row], color=AFTER, lw=1.2, label="diagnosed")
             axis.set(ylabel=f"{name} angle (degrees)")
-        held = bench.recording.role == "validation"
+        held = prepared.recording.role == "validation"
         axes[0, column].set_title("held out" if held else "fitted", fontsize=10)
         axes[1, column].set_xlabel("time (s)")
     axes[0, 0].legend(fontsize=8)

@@ -95,10 +95,10 @@ def print_fit(found: Diagnosis) -> None:
         search.problem.fitted, search.nominal_msni, powers["parameters_only"], powers["after"],
         search.independent_blocks(), strict=True,
     )  # fmt: skip
-    for bench, nominal, parameters, after, effective in rows:
+    for prepared, nominal, parameters, after, effective in rows:
         print(
-            f"  {bench.recording.file:9s} {nominal:9.1f} {parameters:11.1f} {after:12.3f}"
-            f" {bench.whitener.size:12d} {effective:10.0f}"
+            f"  {prepared.recording.file:9s} {nominal:9.1f} {parameters:11.1f} {after:12.3f}"
+            f" {prepared.whitener.size:12d} {effective:10.0f}"
         )
     print("Standard deviation of the loop's width by source, Nm")
     slope = width_slope(found)
@@ -168,14 +168,16 @@ def draw(found: Diagnosis, smoothed: Smoothed, path: Path) -> None:
         title="rec1.csv: torque at port S, smoothed",
     )  # fmt: skip
     problem = found.conclusion.problem
-    bench = problem.fitted[0]
-    torque_column = bench.channels.index("torque_Nm")
+    prepared = problem.fitted[0]
+    torque_column = prepared.channels.index("torque_Nm")
     for fit, colour, given_arguments in (
         (found.conclusion.search.parameters, VERMILION, "parameters only"),
         (found.conclusion.fit, BLUE, "with spring-hysteresis"),
     ):
         innovation = problem.innovations(fit.hypothesis, fit.x[None])[0][0, :, torque_column]
-        time = np.arange(innovation.size) * bench.whitener.block * bench.recording.sample_time_s
+        time = (
+            np.arange(innovation.size) * prepared.whitener.block * prepared.recording.sample_time_s
+        )
         right.plot(time, innovation, color=colour, linewidth=0.6, label=given_arguments)
     right.set(
         xlabel="time [s]", ylabel="normalised innovation", title="rec1.csv: torque_Nm, whitened"

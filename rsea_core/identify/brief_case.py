@@ -63,7 +63,7 @@ def _rows_of_motion(case: Case) -> int:
 def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:
     """Rows as long as the fastest cycle of all recordings allows, and no longer than needed."""
     problem = MultistepProblem(case)
-    cycles = [cycle_s(machine_of(e.base), e.stiffness, e.recording) for e in problem.benches]
+    cycles = [cycle_s(machine_of(e.base), e.stiffness, e.recording) for e in problem.prepared]
     longest_s = min(cycles) / ROWS_OF_CYCLE
     share = most / len(case.identification)
     needed_s = max(r.rows * r.sample_time_s for r in case.identification) / share

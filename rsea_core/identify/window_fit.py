@@ -45,7 +45,7 @@ class FoundFit:
 
     Attributes
     ----------
-    msni : (benches,) array
+    msni : (recordings,) array
         Mean square innovation of each fitted recording.
     """
 

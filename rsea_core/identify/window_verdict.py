@@ -122,9 +122,9 @@ class WindowVerdict(Conclusion):
             self.case.rig, **{k: v for k, v in nominal.items() if hasattr(self.case.rig, k)}
         )
 
-    def predicted(self, bench, hypothesis: Hypothesis, x: NDArray) -> NDArray:
+    def predicted(self, prepared, hypothesis: Hypothesis, x: NDArray) -> NDArray:
         """Readings (n, p) of a whole recording; one that begins in motion from its readings."""
-        return free_run(self.found, bench, (hypothesis, x))
+        return free_run(self.found, prepared, (hypothesis, x))
 
     # ---- judgement
 

@@ -36,8 +36,8 @@ def record() -> Recording:
         columns=r.columns | {"current_command_A": volts + off / FORCE},
         sample_time_s=ROW_s,
     )
-    bench = Problem(Case(name="c", folder=Path(), rig=AXIS, recordings=(pushed,))).benches[0]
-    y = bench.replay.run_many([bench.base])[0, :, CHANNELS.index("load_angle_rad")]
+    prepared = Problem(Case(name="c", folder=Path(), rig=AXIS, recordings=(pushed,))).prepared[0]
+    y = prepared.replay.run_many([prepared.base])[0, :, CHANNELS.index("load_angle_rad")]
     return Recording(
         file="a.csv",
         load=Load(kind="free"),

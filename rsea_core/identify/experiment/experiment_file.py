@@ -17,7 +17,7 @@ from rsea_core.identify.experiment.next_experiment import (
     next_experiment,
 )
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording, Problem
 from rsea_core.recordings.case import Case
 
 MARGIN = 1.2  # how far beyond what was recorded an experiment may go
@@ -130,11 +130,11 @@ def as_page(found: NextExperiment | None) -> dict | None:
 def _torque(conclusion: Judged) -> float:
     """Largest spring torque of the fitted model over the recordings."""
     most = 0.0
-    for bench in conclusion.problem.fitted:
+    for prepared in conclusion.problem.fitted:
         machine = conclusion.problem.trial_machine(
-            bench, conclusion.fit.hypothesis, conclusion.fit.x
+            prepared, conclusion.fit.hypothesis, conclusion.fit.x
         )
-        out = bench.replay.run(_packed(machine))
+        out = prepared.replay.run(_packed(machine))
         most = max(most, float(np.abs(out[:, 3]).max()))
     return most
 
@@ -143,15 +143,15 @@ def _numbers(problem: Problem, fit: Fit):
     """What a fit's machine is under any replay: that of the recording with the same load."""
 
     def numbers(replay: Replay) -> Numbers:
-        bench = _bench(problem, replay)
-        return _packed(problem.trial_machine(bench, fit.hypothesis, fit.x))
+        prepared = _prepared(problem, replay)
+        return _packed(problem.trial_machine(prepared, fit.hypothesis, fit.x))
 
     return numbers
 
 
-def _bench(problem: Problem, replay: Replay) -> Bench:
-    same = [b for b in problem.benches if b.recording.load.kind == replay.load.kind]
-    like = (same or problem.benches)[0]
+def _prepared(problem: Problem, replay: Replay) -> PreparedRecording:
+    same = [b for b in problem.prepared if b.recording.load.kind == replay.load.kind]
+    like = (same or problem.prepared)[0]
     where = replace(like.where, kind=replay.load.kind, file="", index=-1, time_s=replay.time_s)
     return replace(like, replay=replay, base=replay.numbers(problem.model), where=where)
 

@@ -95,22 +95,22 @@ class WindowedProblem(Problem):
 
     def __init__(self, problem: Problem, cuts: Sequence[Cut], scale: Mapping[str, float]):
         self.__dict__.update(copy.copy(problem.__dict__))
-        self.cuts = {c.bench.recording.file: c for c in cuts}
-        self.used = {c.bench.recording.file: np.ones(len(c.overlapping), bool) for c in cuts}
+        self.cuts = {c.prepared.recording.file: c for c in cuts}
+        self.used = {c.prepared.recording.file: np.ones(len(c.overlapping), bool) for c in cuts}
         self.scale = scale
         self.free_scale: dict[str, NDArray] = {}  # of free runs; those without one do not count
         self.fitted = [b for b in problem.fitted if b.recording.file in self.cuts]
 
-    def innovations_of(self, trials, benches=None) -> list[NDArray]:
+    def innovations_of(self, trials, recordings=None) -> list[NDArray]:
         """Errors (m, rows of the used windows, channels) over the scale."""
         found = []
-        for bench in self.fitted if benches is None else benches:
-            piece = self.cuts[bench.recording.file]
-            windows = piece.overlapping[self.used[bench.recording.file]]
-            scale = np.array([self.scale[name] for name in bench.channels])
-            machines = [self.trial_machine(bench, hypothesis, x) for hypothesis, x in trials]
+        for prepared in self.fitted if recordings is None else recordings:
+            piece = self.cuts[prepared.recording.file]
+            windows = piece.overlapping[self.used[prepared.recording.file]]
+            scale = np.array([self.scale[name] for name in prepared.channels])
+            machines = [self.trial_machine(prepared, hypothesis, x) for hypothesis, x in trials]
             every = piece.decimation
-            measured = [bench.measured[a : b + 1 : every] for a, b in windows]
+            measured = [prepared.measured[a : b + 1 : every] for a, b in windows]
             errors = np.stack(
                 [
                     np.concatenate([m - y[::every] for m, y in zip(measured, run, strict=True)])
@@ -118,12 +118,14 @@ class WindowedProblem(Problem):
                     for run in predict_many(piece, machines, windows)
                 ]
             )
-            if bench.recording.file in self.free_scale:
-                whole = predict_readings(bench.replay, machines, bench.channels, bench.where)
+            if prepared.recording.file in self.free_scale:
+                whole = predict_readings(
+                    prepared.replay, machines, prepared.channels, prepared.where
+                )
                 whole = whole[:, ::every]
                 share = np.sqrt(FREE_RUN * errors.shape[1] / whole.shape[1])
-                free = bench.measured[None, ::every] - whole
-                free = free / self.free_scale[bench.recording.file]
+                free = prepared.measured[None, ::every] - whole
+                free = free / self.free_scale[prepared.recording.file]
                 errors = np.concatenate([errors, share * free], axis=1)
             found.append(errors)
         return found
@@ -131,24 +133,26 @@ class WindowedProblem(Problem):
     def weigh_free_runs(self, hypothesis: Hypothesis, x: NDArray) -> None:
         """Let free runs count with the windows: together `FREE_RUN` of what these leave."""
         errors = {e[0]: e[1] for e in self._rms(hypothesis, x)}
-        for bench in self.fitted:
-            machine = self.trial_machine(bench, hypothesis, x)
-            whole = predict_readings(bench.replay, [machine], bench.channels, bench.where)[0]
-            free = np.sqrt(np.mean((bench.measured - whole) ** 2, axis=0))
-            windows = errors[bench.recording.file]
-            scale = np.array([self.scale[name] for name in bench.channels])
+        for prepared in self.fitted:
+            machine = self.trial_machine(prepared, hypothesis, x)
+            whole = predict_readings(prepared.replay, [machine], prepared.channels, prepared.where)[
+                0
+            ]
+            free = np.sqrt(np.mean((prepared.measured - whole) ** 2, axis=0))
+            windows = errors[prepared.recording.file]
+            scale = np.array([self.scale[name] for name in prepared.channels])
             if np.all(np.isfinite(free) & (free > 0.0) & (windows > 0.0)):
-                self.free_scale[bench.recording.file] = scale * free / windows
+                self.free_scale[prepared.recording.file] = scale * free / windows
 
     def _rms(self, hypothesis: Hypothesis, x: NDArray):
-        for bench in self.fitted:
-            piece = self.cuts[bench.recording.file]
+        for prepared in self.fitted:
+            piece = self.cuts[prepared.recording.file]
             runs = predict_windows(
-                piece, self.trial_machine(bench, hypothesis, x), piece.overlapping
+                piece, self.trial_machine(prepared, hypothesis, x), piece.overlapping
             )
             pairs = zip(runs, piece.overlapping, strict=True)
-            left = np.concatenate([y - bench.measured[a : b + 1] for y, (a, b) in pairs])
-            yield bench.recording.file, np.sqrt(np.mean(left**2, axis=0))
+            left = np.concatenate([y - prepared.measured[a : b + 1] for y, (a, b) in pairs])
+            yield prepared.recording.file, np.sqrt(np.mean(left**2, axis=0))
 
     @property
     def tempering(self) -> float:
@@ -167,27 +171,27 @@ def window_errors(
     """Errors of a fitted hypothesis over the windows of recordings."""
     found = []
     for piece in cuts:
-        runs = predict_windows(piece, problem.trial_machine(piece.bench, hypothesis, x))
+        runs = predict_windows(piece, problem.trial_machine(piece.prepared, hypothesis, x))
         found += _errors(piece, runs)
     return tuple(found)
 
 
 def _errors(piece: Cut, runs: Sequence[NDArray]) -> list[WindowError]:
-    bench, found = piece.bench, []
-    for j, name in enumerate(bench.channels):
+    prepared, found = piece.prepared, []
+    for j, name in enumerate(prepared.channels):
         squares = [
-            (y[:, j] - bench.measured[a : b + 1, j]) ** 2
+            (y[:, j] - prepared.measured[a : b + 1, j]) ** 2
             for y, (a, b) in zip(runs, piece.windows, strict=True)
         ]
         found.append(
             WindowError(
-                file=bench.recording.file,
-                role=bench.recording.role,
+                file=prepared.recording.file,
+                role=prepared.recording.role,
                 signal=name,
                 windows=len(squares),
                 rmse=float(np.sqrt(np.mean(np.concatenate(squares)))),
                 by_window=np.sqrt([s.mean() for s in squares]),
-                spread=float(np.std(bench.measured[:, j])),
+                spread=float(np.std(prepared.measured[:, j])),
             )
         )
     return found
@@ -202,9 +206,9 @@ def windowed(problem: Problem, window_s: float = WINDOW_s) -> WindowedProblem:
         If no recording is long enough.
     """
     cuts, refusal = [], ""
-    for bench in problem.fitted:
+    for prepared in problem.fitted:
         try:
-            cuts.append(cut(problem, bench, window_s))
+            cuts.append(cut(problem, prepared, window_s))
         except RecordingError as refused:
             refusal = str(refused)
     if not cuts:
@@ -280,7 +284,7 @@ def cross_validate(
             for file, piece in problem.cuts.items():
                 out = np.flatnonzero(every[file] % folds == fold)
                 if out.size:
-                    machine = problem.trial_machine(piece.bench, hypothesis, fit.x)
+                    machine = problem.trial_machine(piece.prepared, hypothesis, fit.x)
                     runs = predict_windows(piece, machine, piece.windows[out])
                     for w, run in zip(out, runs, strict=True):
                         predicted[file][w] = run
@@ -288,7 +292,7 @@ def cross_validate(
         problem.used = {f: np.ones(len(c.overlapping), bool) for f, c in problem.cuts.items()}
     errors = [e for file, c in problem.cuts.items() for e in _errors(c, predicted[file])]
     first = next(iter(problem.cuts.values()))
-    row_s = first.bench.recording.sample_time_s
+    row_s = first.prepared.recording.sample_time_s
     return CrossValidated(
         window_s=float((first.windows[0, 1] - first.windows[0, 0]) * row_s),
         folds=folds, errors=tuple(errors), fits=tuple(fits),

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording, Problem
 
 STEP = 0.05  # longest of the unknowns' steps for differences: survives the jumps of stick and slip
 LEAST_STEP = 1e-5
@@ -26,11 +26,11 @@ class Fit:
     cost : float
         Half the robust sum of squares, priors included.
     prior_cost : float
-    msni : (benches,) array
+    msni : (recordings,) array
         Mean square innovation of each recording (robust); 1 is the noise.
     energies : list of (windows,) arrays
         Sums of squares of each recording over windows of `WINDOW_s`, robust.
-    hessian, per_bench : (n, n) array, list of them
+    hessian, per_recording : (n, n) array, list of them
         Gauss-Newton, without priors; None where it was not asked for.
     gradients : list of (n,) arrays
     """
@@ -41,7 +41,7 @@ class Fit:
     prior_cost: float
     msni: NDArray
     hessian: NDArray | None = None
-    per_bench: tuple[NDArray, ...] = ()
+    per_recording: tuple[NDArray, ...] = ()
     gradients: tuple[NDArray, ...] = ()
 
 
@@ -79,24 +79,27 @@ class Fitter:
         self.replays = 0
 
     def evaluate(
-        self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
+        self,
+        hypothesis: Hypothesis,
+        X: NDArray,
+        recordings: Sequence[PreparedRecording] | None = None,
     ) -> tuple[NDArray, NDArray, list[NDArray]]:
-        """Costs (m,), MSNI (m, benches) and innovations of many unknowns."""
-        found = self.innovations(hypothesis, X, benches)
+        """Costs (m,), MSNI (m, recordings) and innovations of many unknowns."""
+        found = self.innovations(hypothesis, X, recordings)
         costs, msnis = self.judged(hypothesis, X, found)
         return costs, msnis, found
 
     def innovations(
-        self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None
+        self, hypothesis: Hypothesis, X: NDArray, recordings: Sequence[PreparedRecording] | None
     ) -> list[NDArray]:
         """Innovations (m, rows, channels) of each recording, counted as m replays."""
         self.replays += len(X)
-        return self.problem.innovations(hypothesis, X, benches)
+        return self.problem.innovations(hypothesis, X, recordings)
 
     def judged(
         self, hypothesis: Hypothesis, X: NDArray, found: Sequence[NDArray]
     ) -> tuple[NDArray, NDArray]:
-        """Costs (m,) and MSNI (m, benches) of innovations of unknowns (m, n)."""
+        """Costs (m,) and MSNI (m, recordings) of innovations of unknowns (m, n)."""
         centre, weight = self.problem.prior(hypothesis)
         costs = 0.5 * np.sum((weight * (X - centre)) ** 2, axis=1)
         msnis = np.empty((len(X), len(found)))
@@ -111,7 +114,7 @@ class Fitter:
     def costs(
         self,
         trials: Sequence[tuple[Hypothesis, NDArray]],
-        benches: Sequence[Bench] | None = None,
+        recordings: Sequence[PreparedRecording] | None = None,
     ) -> NDArray:
         """Costs (m,) of unknowns of different hypotheses; infinite where a replay failed."""
         self.replays += len(trials)
@@ -119,7 +122,7 @@ class Fitter:
         for j, (hypothesis, x) in enumerate(trials):
             centre, weight = self.problem.prior(hypothesis)
             total[j] = 0.5 * np.sum((weight * (x - centre)) ** 2)
-        for e in self.problem.innovations_of(trials, benches):
+        for e in self.problem.innovations_of(trials, recordings):
             squares = e**2 if np.isinf(self.far) else robust(e, self.far)[0]
             total += 0.5 * squares.sum(axis=(1, 2))
         return np.where(np.isfinite(total), total, np.inf)
@@ -131,7 +134,7 @@ class Fitter:
         *,
         iterations: int = 8,
         free: NDArray | None = None,
-        benches: Sequence[Bench] | None = None,
+        recordings: Sequence[PreparedRecording] | None = None,
         tempering: float = 1.0,
         central: bool = False,
     ) -> Fit:
@@ -150,7 +153,7 @@ class Fitter:
             Central differences, twice the replays: where priors alone settle a direction, the
             curvature that one-sided ones leave in a column would settle it instead.
         """
-        descent = _Descent(self, hypothesis, x, free, benches, tempering)
+        descent = _Descent(self, hypothesis, x, free, recordings, tempering)
         while descent.taken < iterations:
             columns = descent.differences(central)
             if columns is None or descent.follow(columns, iterations):
@@ -167,11 +170,11 @@ class _Descent:
         hypothesis: Hypothesis,
         x: NDArray,
         free: NDArray | None,
-        benches: Sequence[Bench] | None,
+        recordings: Sequence[PreparedRecording] | None,
         tempering: float,
     ):
         problem = fitter.problem
-        self.fitter, self.hypothesis, self.benches = fitter, hypothesis, benches
+        self.fitter, self.hypothesis, self.prepared = fitter, hypothesis, recordings
         self.tempering = tempering
         self.low, self.high = problem.bounds(hypothesis)
         self.centre, self.weight = problem.prior(hypothesis)
@@ -193,11 +196,11 @@ class _Descent:
         X = np.vstack([x, *(x + offsets), *(x + back if central else ())])
         lengths = (offsets - back).sum(axis=1)
         if self.here is None:
-            found = fitter.innovations(self.hypothesis, X, self.benches)
+            found = fitter.innovations(self.hypothesis, X, self.prepared)
             self.here = [e[0] for e in found]
             found = [e[1:] for e in found]
         else:
-            found = fitter.innovations(self.hypothesis, X[1:], self.benches)
+            found = fitter.innovations(self.hypothesis, X[1:], self.prepared)
         costs, msnis = fitter.judged(self.hypothesis, X[:1], [e[None] for e in self.here])
         self.cost, self.msni = costs[0], msnis[0]
         if not np.isfinite(self.cost):
@@ -248,7 +251,7 @@ class _Descent:
             factors = (self.damping, self.damping * 30.0)
             trials = [self._trial(full, gradient, factor) for factor in factors]
             costs, msnis, tried = self.fitter.evaluate(
-                self.hypothesis, np.array(trials), self.benches
+                self.hypothesis, np.array(trials), self.prepared
             )
             scores = [self._tempered(c, t) for c, t in zip(costs, trials, strict=True)]
             best = int(np.argmin(scores))
@@ -266,15 +269,15 @@ class _Descent:
         wide = np.zeros((self.x.size, self.x.size))
         if self.hessian is not None:
             wide[np.ix_(self.at, self.at)] = self.hessian
-        benches, n = len(self.fitter.problem.fitted), self.x.size
+        count, n = len(self.fitter.problem.fitted), self.x.size
         return Fit(
             hypothesis=self.hypothesis,
             x=self.x,
             cost=float(self.cost),
             prior_cost=self._prior(self.x),
-            msni=np.full(benches, np.inf) if self.msni is None else self.msni,
+            msni=np.full(count, np.inf) if self.msni is None else self.msni,
             hessian=wide,
-            per_bench=tuple(_widen(part, self.at, n) for part in self.parts),
+            per_recording=tuple(_widen(part, self.at, n) for part in self.parts),
             gradients=tuple(_widen_vector(g, self.at, n) for g in self.gradients),
         )
 

@@ -15,12 +15,14 @@ from scipy.linalg import expm
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.engines.linear.linearise import linear_plant
-from rsea_core.identify.fitting.problem import Bench, machine_of
+from rsea_core.identify.fitting.problem import PreparedRecording, machine_of
 from rsea_core.identify.smoothing.error_model import moving_states, one_body, reading_row
 from rsea_core.numeric.threads import share_out
 
 
-def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) -> NDArray:
+def torque_columns(
+    prepared: PreparedRecording, stiffness: float, signals: NDArray, port: str
+) -> NDArray:
     """Innovations (m, blocks, channels) that torques (m, rows) on a body would cause.
 
     The torque of row k acts until row k + 1.
@@ -30,7 +32,7 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
     port : "G" or "L"
         On the wheel or on the load.
     """
-    plant = machine_of(bench.base)
+    plant = machine_of(prepared.base)
     linear = linear_plant(
         plant, tangent=stiffness, gravity_stiffness=plant.gravity, in_contact=False
     )
@@ -42,24 +44,24 @@ def torque_columns(bench: Bench, stiffness: float, signals: NDArray, port: str) 
         A = one_body(linear.A)[np.ix_(states, states)]
         on, inertia = k.WW, plant.inertia + plant.load_inertia
     if on not in states:  # a body that is held, as the wheel of a locked rig without a spring
-        return bench.whitener(np.zeros((len(signals), signals.shape[1], len(bench.channels))))
+        return prepared.whitener(np.zeros((len(signals), signals.shape[1], len(prepared.channels))))
     input_gain = np.zeros(d)
     input_gain[states.index(on)] = 1.0 / inertia
     block = np.zeros((d + 1, d + 1))
     block[:d, :d], block[:d, d] = A, input_gain
-    power = expm(block * bench.recording.sample_time_s)
-    C = np.array([reading_row(plant, stiffness, name, states, d) for name in bench.channels])
-    out = np.empty((len(signals), signals.shape[1], len(bench.channels)))
+    power = expm(block * prepared.recording.sample_time_s)
+    C = np.array([reading_row(plant, stiffness, name, states, d) for name in prepared.channels])
+    out = np.empty((len(signals), signals.shape[1], len(prepared.channels)))
     begins = np.zeros(signals.shape[1], bool)
-    if bench.windows is not None:
-        begins[bench.windows.rows[:, 0]] = True
+    if prepared.windows is not None:
+        begins[prepared.windows.rows[:, 0]] = True
     given = np.ascontiguousarray(signals), power[:d, :d].copy(), power[:d, d].copy(), C, begins
 
     def run(begin: int, end: int) -> None:
         _respond(*given, out, begin, end)
 
     share_out(run, len(signals))
-    return bench.whitener(out)
+    return prepared.whitener(out)
 
 
 def periodic_columns(angle: NDArray, cycles: Sequence[int]) -> NDArray:

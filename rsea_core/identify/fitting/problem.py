@@ -34,7 +34,7 @@ READ = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bench:
+class PreparedRecording:
     """A recording, ready to be replayed and compared."""
 
     recording: Recording
@@ -75,7 +75,7 @@ class Hypothesis:
 
 
 class Problem:
-    """Benches of a case and what is free.
+    """The prepared recordings of a case, and what is free.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Problem:
         self.nominals: tuple[Nominal, ...] = nominals(case)
         self.base = {n.key: n.value for n in self.nominals}
         self.model = ActuatorModel(case.rig)
-        began, self.benches = 0.0, []
+        began, self.prepared = 0.0, []
         past: list[NDArray] = []
         ambient = None
         for index, r in enumerate(case.recordings):
@@ -105,15 +105,15 @@ class Problem:
             )  # fmt: skip
             began += float(r.time_s[-1] - r.time_s[0])
             try:
-                bench = self._bench(r, where)
+                prepared = self._prepared(r, where)
             except (RigError, InputError) as problem:
                 raise type(problem)(f"{r.file}: {problem}") from problem
-            self.benches.append(bench)
-            past += [_heating(bench), np.array([[-1.0, 0.0]])]
-        self.fitted = [b for b in self.benches if b.recording.role == "identification"]
+            self.prepared.append(prepared)
+            past += [_heating(prepared), np.array([[-1.0, 0.0]])]
+        self.fitted = [b for b in self.prepared if b.recording.role == "identification"]
         self.heat = np.concatenate(past[:-1])  # of the whole session, as `initial_rises`
 
-    def _bench(self, r: Recording, where: RunConditions) -> Bench:
+    def _prepared(self, r: Recording, where: RunConditions) -> PreparedRecording:
         replay, base = prepare(self.model, r, step_s=self.step_s)
         floors = noise_floor(self.case.rig, r)
         channels = tuple(
@@ -122,7 +122,7 @@ class Problem:
         require_comparable(r, channels)
         plant = machine_of(base)
         starts = {} if r.initial_rest else {"start_std": start_std(r, plant.gear_ratio, floors)}
-        return Bench(
+        return PreparedRecording(
             recording=r,
             replay=replay,
             where=where,
@@ -139,28 +139,30 @@ class Problem:
             floors=floors, row_s=r.sample_time_s, rows=r.rows, **observed(plant, r), **starts,
         )  # fmt: skip
 
-    def with_fitted(self, benches: Sequence[Bench]) -> "Problem":
+    def with_fitted(self, recordings: Sequence[PreparedRecording]) -> "Problem":
         """The same problem on other readings of the fitted recordings."""
         other = copy(self)
-        other.fitted = list(benches)
+        other.fitted = list(recordings)
         return other
 
-    def in_windows(self, bench: Bench, windows: Windows, start_std: NDArray) -> Bench:
-        """The bench replayed in windows that begin at the smoothed motion.
+    def in_windows(
+        self, prepared: PreparedRecording, windows: Windows, start_std: NDArray
+    ) -> PreparedRecording:
+        """The recording replayed in windows that begin at the smoothed motion.
 
         Parameters
         ----------
         start_std : (5,) array
             Standard deviations of a window's start, as `Windows.motion`.
         """
-        begins = np.zeros(bench.whitener.blocks, bool)
-        at = windows.rows[:, 0] // bench.whitener.block
+        begins = np.zeros(prepared.whitener.blocks, bool)
+        at = windows.rows[:, 0] // prepared.whitener.block
         begins[at[at < begins.size]] = True
         filtered = self._whitener(
-            bench.recording, machine_of(bench.base), bench.channels, dict(bench.floors),
+            prepared.recording, machine_of(prepared.base), prepared.channels, dict(prepared.floors),
             begins=begins, start_std=start_std,
         )  # fmt: skip
-        return replace(bench, windows=windows, whitener=filtered)
+        return replace(prepared, windows=windows, whitener=filtered)
 
     # ---- unknowns
 
@@ -229,44 +231,51 @@ class Problem:
 
     # ---- predictions
 
-    def predict(self, bench: Bench, hypothesis: Hypothesis, X: NDArray) -> NDArray:
-        """Readings (m, rows, channels) of a bench for unknowns (m, n); NaN where it failed."""
-        machines = [self.trial_machine(bench, hypothesis, x) for x in X]
-        return predict_readings(bench.replay, machines, bench.channels, bench.where, bench.windows)
+    def predict(self, prepared: PreparedRecording, hypothesis: Hypothesis, X: NDArray) -> NDArray:
+        """Readings (m, rows, channels) of a recording for unknowns (m, n); NaN where it failed."""
+        machines = [self.trial_machine(prepared, hypothesis, x) for x in X]
+        return predict_readings(
+            prepared.replay, machines, prepared.channels, prepared.where, prepared.windows
+        )
 
-    def trial_machine(self, bench: Bench, hypothesis: Hypothesis, x: NDArray) -> TrialMachine:
+    def trial_machine(
+        self, prepared: PreparedRecording, hypothesis: Hypothesis, x: NDArray
+    ) -> TrialMachine:
         """The machine's numbers on one recording for given unknowns."""
         nominal, laws = self.values(hypothesis, x)
         machine = TrialMachine(
-            plant=bench.base.plant.copy(),
+            plant=prepared.base.plant.copy(),
             fx=np.zeros(fx.N_EFFECTS),
             stiffness=self.case.rig.spring_stiffness_Nm_per_rad or 0.0,
         )
         write_nominal(nominal, self.base, machine, self.case.rig)
         for law, values in zip(hypothesis.laws, laws, strict=True):
-            law.write(values, machine, bench.where)
+            law.write(values, machine, prepared.where)
         return machine
 
     def innovations(
-        self, hypothesis: Hypothesis, X: NDArray, benches: Sequence[Bench] | None = None
+        self,
+        hypothesis: Hypothesis,
+        X: NDArray,
+        recordings: Sequence[PreparedRecording] | None = None,
     ) -> list[NDArray]:
-        """Innovations of each bench: (m, blocks, channels), NaN where a replay failed."""
-        return self.innovations_of([(hypothesis, x) for x in X], benches)
+        """Innovations of each recording: (m, blocks, channels), NaN where a replay failed."""
+        return self.innovations_of([(hypothesis, x) for x in X], recordings)
 
     def innovations_of(
         self,
         trials: Sequence[tuple[Hypothesis, NDArray]],
-        benches: Sequence[Bench] | None = None,
+        recordings: Sequence[PreparedRecording] | None = None,
     ) -> list[NDArray]:
         """As `innovations`, of unknowns of different hypotheses, replayed together."""
         return replay_innovations(
             [
                 ReplayTask(
-                    replay=bench.replay, where=bench.where, windows=bench.windows,
-                    measured=bench.measured, whitener=bench.whitener,
-                    machines=[self.trial_machine(bench, hypothesis, x) for hypothesis, x in trials],
+                    replay=prepared.replay, where=prepared.where, windows=prepared.windows,
+                    measured=prepared.measured, whitener=prepared.whitener,
+                    machines=[self.trial_machine(prepared, h, x) for h, x in trials],
                 )
-                for bench in (self.fitted if benches is None else benches)
+                for prepared in (self.fitted if recordings is None else recordings)
             ]
         )  # fmt: skip
 
@@ -291,7 +300,7 @@ def require_replays(problem: Problem, msni: NDArray) -> None:
 
     Parameters
     ----------
-    msni : (benches,) array
+    msni : (recordings,) array
         Mean square innovations at the rig's values.
 
     Raises
@@ -311,16 +320,16 @@ def require_replays(problem: Problem, msni: NDArray) -> None:
         )
 
 
-def _heating(bench: Bench) -> NDArray:
+def _heating(prepared: PreparedRecording) -> NDArray:
     """Blocks of time [s] and mean squared currents [A^2]: read, commanded, or of the rig."""
-    r = bench.recording
+    r = prepared.recording
     if "current_A" in r:
         current = r["current_A"]
     elif r.command_name == "current_command_A":
-        limit = machine_of(bench.base).current_limit
+        limit = machine_of(prepared.base).current_limit
         current = np.clip(r[r.command_name], -limit, limit)
     elif r.command_name in ("duty", "voltage_V"):
-        current = bench.replay.run_many([bench.base], failures="nan")[0, :, READ_CURRENT]
+        current = prepared.replay.run_many([prepared.base], failures="nan")[0, :, READ_CURRENT]
         current = np.nan_to_num(current)
     else:
         return np.zeros((0, 2))

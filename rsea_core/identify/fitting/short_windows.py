@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import rsea_core.engines.event_driven.states as k
 import rsea_core.machine.plant as mp
 from rsea_core.errors import InputError, RigError
-from rsea_core.identify.fitting.problem import Bench, Problem, Windows, machine_of
+from rsea_core.identify.fitting.problem import PreparedRecording, Problem, Windows, machine_of
 from rsea_core.identify.smoothing.smoother import Smoothed, smooth
 
 SHORT_s, LONGER_s = 0.15, 0.6
@@ -29,28 +29,28 @@ STATES = {
 }
 
 
-def short_benches(problem: Problem, *windows_s: float) -> list[list[Bench]]:
-    """The fitted benches in windows of each length; one that cannot be smoothed stays whole."""
+def prepared_for_short_runs(problem: Problem, *windows_s: float) -> list[list[PreparedRecording]]:
+    """The fitted recordings in windows of each length; one that cannot be smoothed stays whole."""
     rates: dict[tuple, Mapping[str, float]] = {}
-    found: list[list[Bench]] = [[] for _ in windows_s]
-    for bench in problem.fitted:
+    found: list[list[PreparedRecording]] = [[] for _ in windows_s]
+    for prepared in problem.fitted:
         try:
-            motion, spread = _motion(bench, _smoothed(problem, bench, rates))
+            motion, spread = _motion(prepared, _smoothed(problem, prepared, rates))
         except (InputError, RigError, np.linalg.LinAlgError):
             motion = None
-        for window_s, benches in zip(windows_s, found, strict=True):
+        for window_s, recordings in zip(windows_s, found, strict=True):
             if motion is None or not np.all(np.isfinite(motion)):
-                benches.append(bench)
+                recordings.append(prepared)
                 continue
-            rows = _windows(bench, window_s)
+            rows = _windows(prepared, window_s)
             std = UNSURE * np.median(spread[rows[:, 0]], axis=0)
-            benches.append(problem.in_windows(bench, Windows(rows=rows, motion=motion), std))
+            recordings.append(problem.in_windows(prepared, Windows(rows=rows, motion=motion), std))
     return found
 
 
-def _smoothed(problem: Problem, bench: Bench, rates: dict) -> Smoothed:
+def _smoothed(problem: Problem, prepared: PreparedRecording, rates: dict) -> Smoothed:
     """Smoothed motion; rates of one recording serve all others with the same ports."""
-    r = bench.recording
+    r = prepared.recording
     key = (r.load.kind, *sorted(r.columns))
     result = smooth(
         problem.case.rig, r.load, r.columns, ignore=r.derived, rate_density=rates.get(key)
@@ -59,10 +59,10 @@ def _smoothed(problem: Problem, bench: Bench, rates: dict) -> Smoothed:
     return result
 
 
-def _motion(bench: Bench, smoothed: Smoothed) -> tuple[NDArray, NDArray]:
+def _motion(prepared: PreparedRecording, smoothed: Smoothed) -> tuple[NDArray, NDArray]:
     """The five states and their standard deviations (n, 5)."""
-    n = bench.recording.rows
-    plant = machine_of(bench.base)
+    n = prepared.recording.rows
+    plant = machine_of(prepared.base)
     motion, spread = np.zeros((n, 5)), np.zeros((n, 5))
     for state, name in STATES.items():
         if name in smoothed.signals:
@@ -71,15 +71,15 @@ def _motion(bench: Bench, smoothed: Smoothed) -> tuple[NDArray, NDArray]:
     if plant.structure == mp.RIGID_FREE:
         motion[:, k.TL : k.WL + 1] = motion[:, k.TW : k.WW + 1]
     elif plant.structure in (mp.ELASTIC_HELD, mp.RIGID_HELD):
-        motion[:, k.TL] = bench.replay.start_state(bench.base)[k.TL]
+        motion[:, k.TL] = prepared.replay.start_state(prepared.base)[k.TL]
     return motion, spread
 
 
-def _windows(bench: Bench, window_s: float) -> NDArray:
+def _windows(prepared: PreparedRecording, window_s: float) -> NDArray:
     """Windows of whole blocks over all rows; the last takes what is left."""
-    block = bench.whitener.block
-    rows = bench.recording.rows
-    blocks = max(round(window_s / (bench.recording.sample_time_s * block)), 2)
+    block = prepared.whitener.block
+    rows = prepared.recording.rows
+    blocks = max(round(window_s / (prepared.recording.sample_time_s * block)), 2)
     first = np.arange(0, max(rows - blocks * block // 2, 1), blocks * block)
     last = np.append(first[1:] - 1, rows - 1)
     return np.stack([first, last], axis=1)

@@ -10,7 +10,7 @@ from rsea_core.effects.variant import TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.identify.fitting.predictions import restore_angles, shift_starts, undeflect_link
-from rsea_core.identify.fitting.problem import Bench, Problem
+from rsea_core.identify.fitting.problem import PreparedRecording, Problem
 from rsea_core.identify.smoothing.smoother import Smoothed, port_torques
 
 WINDOW_s = 2.5
@@ -33,7 +33,7 @@ class Cut:
         The smoothed motion, arguments of `Replay.warm`.
     """
 
-    bench: Bench
+    prepared: PreparedRecording
     windows: NDArray
     overlapping: NDArray
     path: Mapping[str, NDArray]
@@ -44,7 +44,7 @@ class Cut:
         return max(1, int(np.diff(self.windows[0])[0]) // FITTED_ROWS)
 
 
-def cut(problem: Problem, bench: Bench, window_s: float = WINDOW_s) -> Cut:
+def cut(problem: Problem, prepared: PreparedRecording, window_s: float = WINDOW_s) -> Cut:
     """The windows of a recording and the smoothed motion that they start from.
 
     Raises
@@ -52,7 +52,7 @@ def cut(problem: Problem, bench: Bench, window_s: float = WINDOW_s) -> Cut:
     RecordingError
         If the recording is too short for one window, or its states cannot be smoothed.
     """
-    r = bench.recording
+    r = prepared.recording
     length = round(window_s / r.sample_time_s)
     count = (r.rows - 1) // length if length > 0 else 0
     if count < 1 or length < 2:
@@ -66,20 +66,20 @@ def cut(problem: Problem, bench: Bench, window_s: float = WINDOW_s) -> Cut:
     first = np.arange(count) * length
     often = np.arange(0, r.rows - length, max(length // OVERLAP, 1))
     return Cut(
-        bench=bench,
+        prepared=prepared,
         windows=np.stack([first, first + length], axis=1),
         overlapping=np.stack([often, often + length], axis=1),
-        path=_path(states, bench),
+        path=_path(states, prepared),
     )
 
 
-def _path(states: Smoothed, bench: Bench) -> dict[str, NDArray]:
+def _path(states: Smoothed, prepared: PreparedRecording) -> dict[str, NDArray]:
     """The smoothed motion; bodies that the smoother did not need move with the other."""
     s = states.signals
     angle = s.get("wheel_angle_rad", s.get("load_angle_rad"))
     speed = s.get("wheel_velocity_rad_per_s", s.get("load_velocity_rad_per_s"))
-    held = bench.where.kind in ("locked", "imposed") and "load_angle_rad" not in s
-    still = np.full(angle.size, bench.recording.first("load_angle_rad")) if held else angle
+    held = prepared.where.kind in ("locked", "imposed") and "load_angle_rad" not in s
+    still = np.full(angle.size, prepared.recording.first("load_angle_rad")) if held else angle
     return {
         "wheel_angle_rad": angle,
         "wheel_velocity_rad_per_s": speed,
@@ -102,35 +102,37 @@ def predict_many(
     piece: Cut, machines: Sequence[TrialMachine], windows: NDArray | None = None
 ) -> list[list[NDArray]]:
     """As `predict_windows`, of several machines."""
-    bench, replay = piece.bench, piece.bench.replay
+    prepared, replay = piece.prepared, piece.prepared.replay
     windows = piece.windows if windows is None else windows
     numbers = [Numbers(d.plant, d.regions, d.fx) for d in machines]
     starts = np.stack([replay.warm(n, **piece.path)[windows[:, 0]] for n in numbers])
     undeflect_link(starts)
     for y, d in zip(starts, machines, strict=True):  # the smoothed motion is what sensors read
-        shift_starts(y, d, bench.where)
+        shift_starts(y, d, prepared.where)
     runs = replay.run_windows(numbers, windows, starts, failures="nan", parallel=len(numbers) > 1)
     found: list[list[NDArray]] = [[] for _ in machines]
     for w, run in enumerate(runs):
         first, last = windows[w]
         for i, d in enumerate(machines):
-            restore_angles(run[i], d, bench.where)
-            found[i].append(_readings(run[i], d, bench, slice(first, last + 1)))
+            restore_angles(run[i], d, prepared.where)
+            found[i].append(_readings(run[i], d, prepared, slice(first, last + 1)))
     return found
 
 
-def _readings(run: NDArray, machine: TrialMachine, bench: Bench, rows: slice) -> NDArray:
-    out = np.empty((run.shape[0], len(bench.channels)))
-    for j, name in enumerate(bench.channels):
+def _readings(
+    run: NDArray, machine: TrialMachine, prepared: PreparedRecording, rows: slice
+) -> NDArray:
+    out = np.empty((run.shape[0], len(prepared.channels)))
+    for j, name in enumerate(prepared.channels):
         if name == "spring_deflection_rad":
-            wheel = run[:, CHANNELS.index("motor_angle_rad")] / bench.where.ratio
+            wheel = run[:, CHANNELS.index("motor_angle_rad")] / prepared.where.ratio
             out[:, j] = wheel - run[:, CHANNELS.index("load_angle_rad")]
         else:
             out[:, j] = run[:, CHANNELS.index(name)]
     for column, change in machine.reads:
-        if column in bench.channels:
-            j = bench.channels.index(column)
-            whole = np.array(bench.measured[:, j])  # a delayed reading needs what was before
+        if column in prepared.channels:
+            j = prepared.channels.index(column)
+            whole = np.array(prepared.measured[:, j])  # a delayed reading needs what was before
             whole[rows] = out[:, j]
             out[:, j] = change(whole)[rows]
     return out

@@ -154,9 +154,9 @@ def distance_errors(search: Search, chosen: Fit, others: Sequence[Fit]) -> list[
     found = problem.innovations_of([(f.hypothesis, f.x) for f in (chosen, *others)])
     variance = np.zeros(len(others))
     weights = 0.5 * search.independent_blocks()
-    for bench, e, weight in zip(problem.fitted, found, weights, strict=True):
+    for prepared, e, weight in zip(problem.fitted, found, weights, strict=True):
         squares = e**2 if np.isinf(search.fitter.far) else robust(e, search.fitter.far)[0]
-        row_s = bench.recording.sample_time_s * bench.whitener.block
+        row_s = prepared.recording.sample_time_s * prepared.whitener.block
         length = max(1, round(PIECE_s / row_s))
         variance += weight**2 * variance_of_difference(squares.mean(axis=2), length)
     plain = [tempered_error(search.behind(chosen, f)) for f in others]

@@ -102,10 +102,10 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
     problem = fitter.problem
     n = fit.x.size
     found = jacobian_at(fitter, fit)
-    hessians, bench_gradients, middle = [], [], np.zeros((n, n))
+    hessians, recording_gradients, middle = [], [], np.zeros((n, n))
     pieces: list[NDArray] = []
     gradients: list[NDArray] = []
-    for bench, e, w, J in zip(
+    for prepared, e, w, J in zip(
         problem.fitted, found.innovations, found.weights, found.columns, strict=True
     ):
         blocks = e.shape[0]
@@ -116,18 +116,18 @@ def covariance(fitter: Fitter, fit: Fit, *, tempering: float = 1.0) -> tuple[Spr
             gradients.append(tempering * np.einsum("itc,tc->i", part, e[a:b], optimize=True))
         hessians.append(sum(pieces[-PIECES:]))
         slope = tempering * np.einsum("itc,tc->it", J, w * e, optimize=True)
-        row_s = bench.recording.sample_time_s * bench.whitener.block
+        row_s = prepared.recording.sample_time_s * prepared.whitener.block
         length = max(1, round(BLOCK_s / row_s))
         sums = np.add.reduceat(slope, np.arange(0, blocks, length), axis=1)
         middle += sums @ sums.T
-        bench_gradients.append(slope.sum(axis=1))
+        recording_gradients.append(slope.sum(axis=1))
     _, weight = problem.prior(fit.hypothesis)
     prior = np.diag(weight**2)
     inverse = np.linalg.inv(sum(hessians) + prior + 1e-9 * np.eye(n))
     # a fit has taken part of the scatter away; never less than white innovations of that MSNI
     white = inverse * max(tempering * float(fit.msni.mean()), 1.0)
     sandwich = inverse @ (middle + prior) @ inverse
-    apart = jackknife_of_identifiable(hessians, bench_gradients, prior)
+    apart = jackknife_of_identifiable(hessians, recording_gradients, prior)
     known = inverse_prior_std(white, weight)
     # what the innovations cannot show joins each source: it is the same in every block
     gain = tempering * inverse
@@ -217,7 +217,7 @@ def _without_each(hessians: Sequence[NDArray], prior: NDArray) -> list[NDArray]:
 
 
 def jackknife(
-    hessians: Sequence[NDArray], bench_gradients: Sequence[NDArray], prior: NDArray
+    hessians: Sequence[NDArray], recording_gradients: Sequence[NDArray], prior: NDArray
 ) -> NDArray:
     """Covariance (n, n) from Gauss-Newton fits that leave out one recording each.
 
@@ -227,7 +227,7 @@ def jackknife(
 
     Parameters
     ----------
-    hessians, bench_gradients : (n, n) and (n,) arrays of each recording
+    hessians, recording_gradients : (n, n) and (n,) arrays of each recording
         Of half the sum of squares, at the optimum.
     prior : (n, n) array
         Inverse covariance of the priors.
@@ -237,7 +237,10 @@ def jackknife(
         return np.zeros((n, n))
     others = _without_each(hessians, prior)
     moves = np.array(  # least squares: two values that rows do not tell apart leave no inverse
-        [np.linalg.lstsq(H, g, rcond=None)[0] for H, g in zip(others, bench_gradients, strict=True)]
+        [
+            np.linalg.lstsq(H, g, rcond=None)[0]
+            for H, g in zip(others, recording_gradients, strict=True)
+        ]
     )
     moves = moves - moves.mean(axis=0)
     return (count - 1) / count * moves.T @ moves

@@ -150,7 +150,7 @@ def _columns(problem: Problem, base: Fit, laws: Sequence[Law]) -> tuple[NDArray,
 
 
 def _gain(traces: NDArray, blocks: NDArray, price: float) -> float:
-    """Log-likelihood of `Search.score` that explaining traces (benches,), over the noise, would
+    """Log-likelihood of `Search.score` that explaining traces (recordings,), over the noise, would
     bring."""
     return 0.5 * float(np.sum(blocks * np.log1p(traces))) - price
 

@@ -140,7 +140,7 @@ def _with(problem: Problem, base: Fit, amount: DetectableSize) -> Fit:
     own = problem.start(Hypothesis(laws=(law,)))[len(problem.nominals) :]
     return replace(
         base, hypothesis=Hypothesis(laws=(law,)), x=np.concatenate([base.x, own]), hessian=None,
-        per_bench=(), gradients=(),
+        per_recording=(), gradients=(),
     )  # fmt: skip
 
 

@@ -21,7 +21,7 @@ from rsea_core.engines.fixed_step.replay import Numbers
 from rsea_core.engines.fixed_step.step_length import DEFAULT_STEP_s, longest_step_s
 from rsea_core.identify.fitting.jacobian import Jacobian
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Bench, Problem, predict_readings, prepare
+from rsea_core.identify.fitting.problem import PreparedRecording, Problem, predict_readings, prepare
 
 COUNTED = {
     "motor_angle_rad": ("motor_encoder_counts_per_rev", "start_motor_rad"),
@@ -44,9 +44,9 @@ def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
     list of (index of the fitted recording, innovations)
     """
     found = []
-    for b, bench in enumerate(problem.fitted):
-        machine = problem.trial_machine(bench, fit.hypothesis, fit.x)
-        for j, name in enumerate(bench.channels):
+    for b, prepared in enumerate(problem.fitted):
+        machine = problem.trial_machine(prepared, fit.hypothesis, fit.x)
+        for j, name in enumerate(prepared.channels):
             field, start = COUNTED.get(name, ("", ""))
             counts = getattr(problem.case.rig, field, None)
             if not counts:
@@ -54,17 +54,17 @@ def counts_of(problem: Problem, fit: Fit) -> list[tuple[int, NDArray]]:
             count = 2.0 * np.pi / counts
             began, place = places()
             off = np.zeros(PLACES)
-            held = name == "load_angle_rad" and bench.recording.load.kind in HELD
-            if not held and abs(bench.measured[0, j]) > 0.5 * count:
+            held = name == "load_angle_rad" and prepared.recording.load.kind in HELD
+            if not held and abs(prepared.measured[0, j]) > 0.5 * count:
                 off = count * (place - np.floor(place + began))
             machines = [
                 replace(machine, **{start: getattr(machine, start) + o}) for o in (0.0, *off)
             ]
-            read = predict_readings(bench.replay, machines, bench.channels, bench.where)
+            read = predict_readings(prepared.replay, machines, prepared.channels, prepared.where)
             error = read[1:] - read[0]
             error[:, :, j] += rounding(read[1:, :, j], count, began)
             if np.all(np.isfinite(error)):
-                found += [(b, e / np.sqrt(PLACES)) for e in bench.whitener(error)]
+                found += [(b, e / np.sqrt(PLACES)) for e in prepared.whitener(error)]
     return found
 
 
@@ -81,7 +81,7 @@ def rounding(values: NDArray, count: float, began: NDArray) -> NDArray:
 
 def finer_of(problem: Problem, fit: Fit, derivatives: Jacobian) -> list[tuple[int, NDArray]]:
     """Changes of the innovations (blocks, channels) of each recording by half the step."""
-    fine = [_finer(problem, bench, fit) for bench in problem.fitted]
+    fine = [_finer(problem, prepared, fit) for prepared in problem.fitted]
     found = problem.innovations(fit.hypothesis, fit.x[None], fine)
     changes = [e[0] - old for e, old in zip(found, derivatives.innovations, strict=True)]
     return [(b, c) for b, c in enumerate(changes) if np.all(np.isfinite(c))]
@@ -95,13 +95,13 @@ def pulls_of(derivatives: Jacobian, innovations: list[tuple[int, NDArray]]) -> l
     ]
 
 
-def _finer(problem: Problem, bench: Bench, fit: Fit) -> Bench:
-    """The bench replayed in half its steps."""
+def _finer(problem: Problem, prepared: PreparedRecording, fit: Fit) -> PreparedRecording:
+    """The recording replayed in half its steps."""
     step = problem.step_s
     if step is None:
-        d = problem.trial_machine(bench, fit.hypothesis, fit.x)
+        d = problem.trial_machine(prepared, fit.hypothesis, fit.x)
         n = Numbers(d.plant, d.regions, d.fx)
         step = min(longest_step_s(n.plant, n.spring, n.fx), DEFAULT_STEP_s)
-    step = min(step, bench.recording.sample_time_s)
-    replay, _ = prepare(problem.model, bench.recording, step_s=0.5 * step)
-    return replace(bench, replay=replay)
+    step = min(step, prepared.recording.sample_time_s)
+    replay, _ = prepare(problem.model, prepared.recording, step_s=0.5 * step)
+    return replace(prepared, replay=replay)

@@ -16,7 +16,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.effects.gear_transmission_error import GearTransmissionError
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Bench, machine_of
+from rsea_core.identify.fitting.problem import PreparedRecording, machine_of
 from rsea_core.identify.judgement.criteria import IN_CONTACT, OWN_PACE_s
 from rsea_core.identify.judgement.residual_fit import TableFit, table_fit
 from rsea_core.identify.locate.mismatch_map import (
@@ -188,9 +188,9 @@ def unexplained_residual(search: Search) -> UnexplainedResidual | None:
     tables = [_table(search, b) for b in tried]
     best = _followed(search, tried, tables) or favoured_by_screening(search, tried)
     traces = []
-    for index, bench in enumerate(problem.fitted):
+    for index, prepared in enumerate(problem.fitted):
         time, value, std = smoothed_signal(problem, start.hypothesis, best, index)
-        traces.append(Trace(file=bench.recording.file, time_s=time, value=value, std=std))
+        traces.append(Trace(file=prepared.recording.file, time_s=time, value=value, std=std))
     subsystem = _subsystem(search, best.ranked, traces)
     found, of_change = _concentrated(search, traces)
     rivals = {
@@ -290,14 +290,14 @@ def _subsystem(search: Search, entry: RankedPort, traces: Sequence[Trace]) -> st
 
 def _concentrated(search: Search, traces: Sequence[Trace]) -> tuple[Concentration | None, bool]:
     """The range of a state that holds most of the signal, or of its change."""
-    benches = search.short or search.problem.fitted
+    recordings = search.short or search.problem.fitted
     best, of_change = None, False
     for change in (False, True):
         pooled: dict[tuple[str, str], list[tuple[NDArray, NDArray, int]]] = {}
-        for bench, trace in zip(benches, traces, strict=True):
+        for prepared, trace in zip(recordings, traces, strict=True):
             weight = np.gradient(trace.value) ** 2 if change else trace.value**2
             length = max(1, round(BLOCK_s / np.median(np.diff(trace.time_s))))
-            for name, values in _states(bench, trace.time_s).items():
+            for name, values in _states(prepared, trace.time_s).items():
                 pooled.setdefault(name, []).append((values, weight, length))
         for found in concentrations(pooled, 0)[:1]:
             if best is None or found.share - found.of_time > best.share - best.of_time:
@@ -305,13 +305,13 @@ def _concentrated(search: Search, traces: Sequence[Trace]) -> tuple[Concentratio
     return best, of_change
 
 
-def _states(bench: Bench, time_s: NDArray) -> Mapping[tuple[str, str], NDArray]:
+def _states(prepared: PreparedRecording, time_s: NDArray) -> Mapping[tuple[str, str], NDArray]:
     """What the signal may depend on, at given times, by (words, unit)."""
     found = {("the time", "s"): time_s - time_s[0]}
-    if bench.windows is None:
+    if prepared.windows is None:
         return found
-    plant, motion = machine_of(bench.base), bench.windows.motion
-    rows = bench.recording.time_s
+    plant, motion = machine_of(prepared.base), prepared.windows.motion
+    rows = prepared.recording.time_s
     at = {j: np.interp(time_s, rows, motion[:, j]) for j in range(motion.shape[1])}
     found["the wheel's speed (either way)", "rad/s"] = np.abs(at[k.WW])
     found["the wheel's angle", "rad"] = at[k.TW]

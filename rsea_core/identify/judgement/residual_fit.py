@@ -169,8 +169,8 @@ def _of_load(search: Search, base: Fit, peak: float) -> list[Law]:
 def _signals(search: Search, base: Fit, column: str) -> list[tuple[NDArray, NDArray]]:
     """Times and what a fit expects a reading to be, of every recording that has it."""
     found = []
-    for bench in search.problem.fitted:
-        if column in bench.channels:
-            out = search.problem.predict(bench, base.hypothesis, base.x[None])[0]
-            found.append((bench.recording.time_s, out[:, bench.channels.index(column)]))
+    for prepared in search.problem.fitted:
+        if column in prepared.channels:
+            out = search.problem.predict(prepared, base.hypothesis, base.x[None])[0]
+            found.append((prepared.recording.time_s, out[:, prepared.channels.index(column)]))
     return found

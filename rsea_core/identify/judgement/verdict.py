@@ -79,7 +79,7 @@ def is_unchanged(before: Fit, after: Fit, shorts: tuple[NDArray, NDArray] | None
 
     Parameters
     ----------
-    shorts : two (benches,) arrays or None
+    shorts : two (recordings,) arrays or None
         Powers of short runs before and after.
     """
     had, left = before.msni, after.msni

@@ -289,7 +289,7 @@ def at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> bool:
     if law.effect != DriveThermal.effect:
         return False
     most_K = MOST_FITTED_RISE * MOST_RISE_K
-    return not peak_rise_K(problem, fit.hypothesis, fit.x, problem.benches) < most_K
+    return not peak_rise_K(problem, fit.hypothesis, fit.x, problem.prepared) < most_K
 
 
 def values_at_bound(problem: MultistepProblem, fit: Estimate, law: Law) -> tuple[str, ...]:

@@ -134,7 +134,7 @@ def held_out(found: Found) -> HeldOut | None:
         return None
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     own, gain, ratio = found.estimator, 0.0, 0.0
-    if any(b.recording.role == "validation" for b in found.problem.benches):
+    if any(b.recording.role == "validation" for b in found.problem.prepared):
         gain, ratio = _gain_held_out(found, trials, found.horizon)
     if abs(gain) < SILENT:  # recordings that do not move what the laws are about
         shortened = own.having([replace(t, seen=1.0 - LAST) for t in own.tracks])
@@ -177,7 +177,7 @@ def predicts_better(found: Found) -> bool:
     is shorter, only these. A reading is predicted better if its error is lower beyond chance
     (`lower_beyond_chance`). True too if no window is long enough to judge by.
     """
-    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    unseen = [b for b in found.problem.prepared if b.recording.role == "validation"]
     longest = found.horizon or np.inf
     lengths = [h for h in HORIZONS if PREDICTABLE <= (h or np.inf) <= longest]
     lengths = [h for h in lengths or [found.horizon] if h is None or _long_enough(found, unseen, h)]
@@ -239,7 +239,7 @@ def held_out_in_short_windows(found: Found) -> HeldOut | None:
     A machine that stops at detents, or turns over, is not predictable for longer whatever its laws:
     the smallest error of the start decides where it comes to rest. None without such recordings.
     """
-    if not any(b.recording.role == "validation" for b in found.problem.benches):
+    if not any(b.recording.role == "validation" for b in found.problem.prepared):
         return None
     trials = [(found.base.hypothesis, found.base.x), (found.best.hypothesis, found.best.x)]
     gain, ratio = _gain_held_out(found, trials, PREDICTABLE)
@@ -248,7 +248,7 @@ def held_out_in_short_windows(found: Found) -> HeldOut | None:
 
 def _gain_held_out(found: Found, trials: list, horizon: float | None) -> tuple[float, float]:
     """Gain of the second trial over the first on recordings held out, and over its deviation."""
-    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    unseen = [b for b in found.problem.prepared if b.recording.role == "validation"]
     others = [of_recordings(found, unseen, trial, horizon) for trial in trials]
     before, after = (o.innovations([t]) for o, t in zip(others, trials, strict=True))
     gain = found.estimator.tempering * (_power(before) - _power(after))
@@ -264,7 +264,7 @@ def with_pause_shown(
     the next start is an unknown initial state, estimated as the other ones are.
     """
     h, _ = trial
-    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    unseen = [b for b in found.problem.prepared if b.recording.role == "validation"]
     if not unseen or len(found.problem.fitted) > 1 or DriveThermal.effect not in h.effects:
         return trial
     tried = [trial, *((h, _rested(found, trial, pause_s)) for pause_s in PAUSES_s)]

@@ -22,16 +22,16 @@ def disturbances(fitter: Fitter, fit: Fit, load_torque_Nm: float) -> list[Law]:
     stiffness = problem.case.rig.spring_stiffness_Nm_per_rad or 0.0
     found = problem.innovations(fit.hypothesis, fit.x[None])
     laws = []
-    for bench, e in zip(problem.fitted, found, strict=True):
-        if bench.where.kind in ("locked", "imposed"):
+    for prepared, e in zip(problem.fitted, found, strict=True):
+        if prepared.where.kind in ("locked", "imposed"):
             continue
-        r = bench.recording
+        r = prepared.recording
         length = float(r.time_s[-1] - r.time_s[0])
         cells = max(int(length / CELL_s), 4)
         width = length / cells
         at = np.minimum(((r.time_s - r.time_s[0]) / width).astype(int), cells - 1)
         signals = (at[None] == np.arange(cells)[:, None]).astype(float)
-        columns = torque_columns(bench, stiffness, signals, "L").reshape(cells, -1)
+        columns = torque_columns(prepared, stiffness, signals, "L").reshape(cells, -1)
         target = e[0].reshape(-1)
         root = np.sqrt(robust(target, fitter.far)[1]) if np.isfinite(fitter.far) else 1.0
         columns, target = columns * root, target * root
@@ -57,6 +57,8 @@ def disturbances(fitter: Fitter, fit: Fit, load_torque_Nm: float) -> list[Law]:
             _, a, b, peak = best
             taken[max(a - 1, 0) : b + 1] = True
             start = (r.time_s[0] + a * width, (b - a) * width, peak)
-            law = disturbance(r.file, bench.where.index, start, load_torque_Nm, float(r.time_s[-1]))
+            law = disturbance(
+                r.file, prepared.where.index, start, load_torque_Nm, float(r.time_s[-1])
+            )
             laws.append(law)
     return laws

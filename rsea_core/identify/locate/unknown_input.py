@@ -21,7 +21,13 @@ from numpy.typing import NDArray
 
 from rsea_core.engines.fixed_step.replay import Numbers
 from rsea_core.identify.fitting.least_squares import STEP, Fit
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, machine_of, observed
+from rsea_core.identify.fitting.problem import (
+    Hypothesis,
+    PreparedRecording,
+    Problem,
+    machine_of,
+    observed,
+)
 from rsea_core.identify.locate.signal_filter import SignalModel, signal_likelihoods, smooth_errors
 from rsea_core.identify.smoothing.error_model import READING, ErrorModel, error_model
 
@@ -51,7 +57,7 @@ class RankedPort:
         Log-likelihood of the readings with log prior, up to a constant.
     pace_s : float
         Correlation time.
-    levels : (benches,) array
+    levels : (recordings,) array
         Its standard deviation in each recording: V, Nm or the reading's unit.
     scale : float
         Unit of the levels that were tried.
@@ -67,12 +73,12 @@ class RankedPort:
 
 def ranked_ports(problem: Problem, fit: Fit) -> list[RankedPort]:
     """Ports by how well an unknown signal there explains what a fit leaves, best first."""
-    columns = [_columns(problem, fit, bench) for bench in problem.fitted]
-    models = [model_of(problem, fit, bench) for bench in problem.fitted]
+    columns = [_columns(problem, fit, prepared) for prepared in problem.fitted]
+    models = [model_of(problem, fit, prepared) for prepared in problem.fitted]
     prior = _prior(problem, fit)
     magnitudes: dict[str, float] = {}
-    for bench, model in zip(problem.fitted, models, strict=True):
-        for name, scale in _magnitudes(bench, model).items():
+    for prepared, model in zip(problem.fitted, models, strict=True):
+        for name, scale in _magnitudes(prepared, model).items():
             magnitudes[name] = max(scale, magnitudes.get(name, 0.0))
     jobs = [(name, scale, pace) for name, scale in magnitudes.items() for pace in PACES_s]
 
@@ -136,13 +142,13 @@ def fit_jointly(problem: Problem, start: Fit, ranked: RankedPort) -> JointFit:
 def _relaxed(problem: Problem, hypothesis: Hypothesis, x: NDArray, ranked: RankedPort) -> JointFit:
     low, high = problem.bounds(hypothesis)
     best, trial, scale, readings = None, x, ranked.scale, 0
-    for bench in problem.fitted:
-        model = model_of(problem, _at(problem, hypothesis, x), bench)
-        readings += model.modes.size * len(bench.channels)
+    for prepared in problem.fitted:
+        model = model_of(problem, _at(problem, hypothesis, x), prepared)
+        readings += model.modes.size * len(prepared.channels)
     for _ in range(RELAXED):
         at = _at(problem, hypothesis, trial)
-        columns = [_columns(problem, at, bench) for bench in problem.fitted]
-        models = [model_of(problem, at, bench) for bench in problem.fitted]
+        columns = [_columns(problem, at, prepared) for prepared in problem.fitted]
+        models = [model_of(problem, at, prepared) for prepared in problem.fitted]
         with ThreadPoolExecutor(get_num_threads()) as pool:
             stats = list(
                 pool.map(
@@ -182,34 +188,34 @@ def _prior(problem: Problem, fit: Fit) -> tuple[NDArray, NDArray]:
     return weight**2 + 1e-9, fit.x - centre
 
 
-def _columns(problem: Problem, fit: Fit, bench: Bench) -> NDArray:
+def _columns(problem: Problem, fit: Fit, prepared: PreparedRecording) -> NDArray:
     """(1 + n, rows, channels): what the replay leaves, and its derivatives by the unknowns."""
     n = fit.x.size
     X = np.vstack([fit.x, *(fit.x + STEP * np.eye(n))])
-    out = problem.predict(bench, fit.hypothesis, X)
+    out = problem.predict(prepared, fit.hypothesis, X)
     columns = np.empty_like(out)
-    columns[0] = bench.measured - out[0]
+    columns[0] = prepared.measured - out[0]
     columns[1:] = -(out[1:] - out[0]) / STEP
     columns[~np.all(np.isfinite(columns), axis=(1, 2))] = 0.0
     return columns
 
 
-def model_of(problem: Problem, fit: Fit, bench: Bench) -> ErrorModel:
+def model_of(problem: Problem, fit: Fit, prepared: PreparedRecording) -> ErrorModel:
     """The errors' model of a recording around a fit."""
-    machine = problem.trial_machine(bench, fit.hypothesis, fit.x)
-    r = bench.recording
-    plant = machine_of(Numbers(machine.plant, bench.base.spring, machine.fx))
+    machine = problem.trial_machine(prepared, fit.hypothesis, fit.x)
+    r = prepared.recording
+    plant = machine_of(Numbers(machine.plant, prepared.base.spring, machine.fx))
     return error_model(
-        plant, machine.stiffness, channels=bench.channels, floors=bench.floors,
+        plant, machine.stiffness, channels=prepared.channels, floors=prepared.floors,
         row_s=r.sample_time_s, rows=r.rows, block=max(1, round(BLOCK_s / r.sample_time_s)),
         **observed(plant, r),
     )  # fmt: skip
 
 
-def _magnitudes(bench: Bench, model: ErrorModel) -> dict[str, float]:
+def _magnitudes(prepared: PreparedRecording, model: ErrorModel) -> dict[str, float]:
     """Ports of a recording, and the size of a signal there to begin with."""
     plant = model.plant
-    found = {f"{READING}{name}": COUNTS * bench.floors[name] for name in bench.channels}
+    found = {f"{READING}{name}": COUNTS * prepared.floors[name] for name in prepared.channels}
     torque = max(plant.gravity, LEAST_TORQUE_Nm)
     if np.isfinite(plant.current_limit):
         torque = max(torque, TORQUE_SHARE * plant.current_limit * plant.torque_per_ampere)
@@ -284,14 +290,14 @@ def smoothed_signal(
     Fixed-interval smoothing of what the values leave (Rauch, Tung & Striebel, AIAA J. 3 (1965)
     1445).
     """
-    bench, ranked = problem.fitted[index], found.ranked
-    model = model_of(problem, _at(problem, hypothesis, found.x), bench)
-    out = problem.predict(bench, hypothesis, found.x[None])[0]
+    prepared, ranked = problem.fitted[index], found.ranked
+    model = model_of(problem, _at(problem, hypothesis, found.x), prepared)
+    out = problem.predict(prepared, hypothesis, found.x[None])[0]
     n = model.modes.size
-    left = (bench.measured - out)[: n * model.block].reshape(n, model.block, -1).mean(axis=1)
+    left = (prepared.measured - out)[: n * model.block].reshape(n, model.block, -1).mean(axis=1)
     A, C, Q, P = model.with_input(ranked.port, ranked.pace_s)
     Q[0, 0] *= ranked.levels[index] ** 2
     P[0, 0] *= ranked.levels[index] ** 2
     mean, variance = smooth_errors(left, model.transitions(A), C, model.R, Q, P)
-    time = bench.recording.time_s[: n * model.block].reshape(n, -1).mean(axis=1)
+    time = prepared.recording.time_s[: n * model.block].reshape(n, -1).mean(axis=1)
     return time, mean, np.sqrt(np.maximum(variance, 0.0))

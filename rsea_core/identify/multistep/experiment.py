@@ -347,19 +347,19 @@ class MultistepProblem(Problem):
         found.reach = tolerances
         return found
 
-    def trial_machine(self, bench: Experiment, hypothesis: Hypothesis, x: NDArray) -> TrialMachine:
+    def trial_machine(self, e: Experiment, hypothesis: Hypothesis, x: NDArray) -> TrialMachine:
         """A machine's numbers; starts are the motor sensor's where two read one body."""
-        machine = super().trial_machine(bench, hypothesis, x)
-        if bench.read_twice:
+        machine = super().trial_machine(e, hypothesis, x)
+        if e.read_twice:
             machine.start_load_scale, machine.start_load_rad = 1.0, 0.0
         return machine
 
-    def predict(self, bench: Experiment, hypothesis: Hypothesis, X: NDArray) -> NDArray:
+    def predict(self, e: Experiment, hypothesis: Hypothesis, X: NDArray) -> NDArray:
         """Readings (m, n, p) of whole runs of a recording for unknowns (m, u)."""
-        machines = [self.trial_machine(bench, hypothesis, x) for x in X]
-        return bench.readings(bench.runs(machines, None), machines)
+        machines = [self.trial_machine(e, hypothesis, x) for x in X]
+        return e.readings(e.runs(machines, None), machines)
 
-    def _bench(self, r: Recording, where: RunConditions) -> Experiment:
+    def _prepared(self, r: Recording, where: RunConditions) -> Experiment:
         return experiment(
             self.model, r, where, timing=self.timing, steps=self.steps,
             current_commanded=self.current_commanded,

@@ -10,8 +10,8 @@ from rsea_core.effects.base import Context
 from rsea_core.effects.drive_thermal import DriveThermal
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.peak_temperature import benches_with_test, reported_rise_K
-from rsea_core.identify.fitting.problem import Bench, Hypothesis
+from rsea_core.identify.fitting.peak_temperature import recordings_with_test, reported_rise_K
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording
 from rsea_core.identify.judgement.alternatives import considered, listed_rivals, nearest
 from rsea_core.identify.judgement.covariance import Spread, between_laws, covariance
 from rsea_core.identify.judgement.criteria import (
@@ -78,9 +78,9 @@ class Conclusion:
         if self.residual is not None and not self._runs_by_laws(self.residual):
             self._fit_jointly(self.residual)
 
-    def predicted(self, bench, hypothesis: Hypothesis, x: NDArray) -> NDArray:
+    def predicted(self, prepared, hypothesis: Hypothesis, x: NDArray) -> NDArray:
         """Readings (n, p) that unknowns (u,) of a hypothesis predict for a whole recording."""
-        return self.problem.predict(bench, hypothesis, x[None])[0]
+        return self.problem.predict(prepared, hypothesis, x[None])[0]
 
     def _has_unmodelled_input(self) -> bool:
         """Whether values alone seem to explain what still has a place in the machine."""
@@ -246,8 +246,8 @@ class Conclusion:
         return AMBIENT_C
 
     @cached_property
-    def _warmed(self) -> list[Bench]:
-        return benches_with_test(self.problem, self.ambient())
+    def _warmed(self) -> list[PreparedRecording]:
+        return recordings_with_test(self.problem, self.ambient())
 
     def explained_excess(self) -> float:
         """Share of the MSNI above noise that the effects take away."""

@@ -156,7 +156,7 @@ def heat_left(problem: Problem, laws: Laws, resistance_ohm: float) -> tuple[floa
         problem.heat, resistance_ohm, capacity, capacity / values["winding_time_s"],
         CASE_J_per_K, values["pause_s"],
     )  # fmt: skip
-    last = problem.benches[-1]
+    last = problem.prepared[-1]
     if "temperature_C" not in last.recording:
         return winding, case
     read = last.recording["temperature_C"]
@@ -174,12 +174,12 @@ def rest_of(problem: Problem, laws: Laws, stiffness: float) -> float:
     if width <= 0.0 or stiffness <= 0.0:
         return 0.0
     bends = []
-    for bench in problem.fitted:
-        r, torque = bench.recording, bench.where.start_torque_Nm
-        deflected = r.first("motor_angle_rad") / bench.where.ratio - r.first("load_angle_rad")
+    for prepared in problem.fitted:
+        r, torque = prepared.recording, prepared.where.start_torque_Nm
+        deflected = r.first("motor_angle_rad") / prepared.where.ratio - r.first("load_angle_rad")
         deflected = deflected if "motor_angle_rad" in r else 0.0
         if torque is not None and abs(deflected) < 0.5 * width:
-            noise = bench.floors.get("torque_Nm", 0.0)
+            noise = prepared.floors.get("torque_Nm", 0.0)
             bends.append((torque**2 - noise**2) / stiffness**2)
     variance = float(np.mean(bends)) if bends else 0.0
     return min(float(np.sqrt(3.0 * max(variance, 0.0))), 0.5 * width)

@@ -28,8 +28,8 @@ def largest_channel(conclusion: Conclusion) -> str:
     f = conclusion.search.parameters
     found = conclusion.problem.innovations(f.hypothesis, f.x[None])
     totals: dict[str, float] = {}
-    for bench, e in zip(conclusion.problem.fitted, found, strict=True):
-        for j, name in enumerate(bench.channels):
+    for prepared, e in zip(conclusion.problem.fitted, found, strict=True):
+        for j, name in enumerate(prepared.channels):
             totals[name] = totals.get(name, 0.0) + float(np.nansum(e[0, :, j] ** 2))
     return max(totals, key=totals.get) if totals else ""
 
@@ -100,18 +100,18 @@ def fit_table(conclusion: Conclusion) -> list[dict]:
     rows = []
     plain, fit, known = Hypothesis(), conclusion.fit, conclusion.search.parameters
     zero = conclusion.problem.start(plain)
-    for bench in conclusion.problem.benches:
-        before = conclusion.predicted(bench, plain, zero)
-        only = conclusion.predicted(bench, known.hypothesis, known.x)
-        after = conclusion.predicted(bench, fit.hypothesis, fit.x)
-        for j, name in enumerate(bench.channels):
-            measured = bench.measured[:, j]
-            spread, floor = float(np.std(measured)), bench.floors[name]
+    for prepared in conclusion.problem.prepared:
+        before = conclusion.predicted(prepared, plain, zero)
+        only = conclusion.predicted(prepared, known.hypothesis, known.x)
+        after = conclusion.predicted(prepared, fit.hypothesis, fit.x)
+        for j, name in enumerate(prepared.channels):
+            measured = prepared.measured[:, j]
+            spread, floor = float(np.std(measured)), prepared.floors[name]
             if spread < QUIET * floor:
                 continue
             row = {
-                "file": bench.recording.file,
-                "role": bench.recording.role,
+                "file": prepared.recording.file,
+                "role": prepared.recording.role,
                 "signal": name,
                 "unit": name.rsplit("_", 1)[-1],
                 "noise_floor": floor,

@@ -16,7 +16,7 @@ from rsea_core.effects.spring_hysteresis import SpringHysteresis
 from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 from rsea_core.effects.variant import Law, TrialMachine, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, machine_of
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording, machine_of
 from rsea_core.identify.result.conclusion import Conclusion
 
 POINTS = 161
@@ -29,11 +29,11 @@ class Ranges:
     def __init__(self, conclusion: Conclusion):
         problem, fit = conclusion.problem, conclusion.fit
         self._ends: dict[str, tuple[float, float]] = {}
-        for bench in problem.fitted:
-            trial = problem.trial_machine(bench, fit.hypothesis, fit.x)
-            run = bench.runs([trial])[0]
+        for prepared in problem.fitted:
+            trial = problem.trial_machine(prepared, fit.hypothesis, fit.x)
+            run = prepared.runs([trial])[0]
             at = {name: run[:, j] for j, name in enumerate(CHANNELS)}
-            time, ratio = bench.recording.time_s, bench.where.ratio
+            time, ratio = prepared.recording.time_s, prepared.where.ratio
             wheel, load = at["motor_angle_rad"] / ratio, at["load_angle_rad"]
             self._add("wheel_angle", wheel)
             self._add("wheel_speed", np.gradient(wheel, time))
@@ -45,12 +45,12 @@ class Ranges:
             self._add("torque", at["torque_Nm"])
             self._add("current", at["current_A"])
             self._add("time", time - time[0])
-            if np.isfinite(angle := machine_of(bench.base).contact_angle):
+            if np.isfinite(angle := machine_of(prepared.base).contact_angle):
                 self._add("depth", np.maximum(load - angle, 0.0))
-            for name in bench.channels:
-                self._add(name, bench.measured[:, bench.channels.index(name)])
-            if bench.recording.command_name is not None:
-                self._add("command", bench.recording[bench.recording.command_name])
+            for name in prepared.channels:
+                self._add(name, prepared.measured[:, prepared.channels.index(name)])
+            if prepared.recording.command_name is not None:
+                self._add("command", prepared.recording[prepared.recording.command_name])
 
     def _add(self, name: str, values: NDArray) -> None:
         if np.all(np.isfinite(values)):
@@ -79,16 +79,16 @@ def _loop(conclusion: Conclusion, law: Law) -> dict | None:
 
     None where the torque or an angle was not read.
     """
-    bench, plain = _bench_of(conclusion, law), Hypothesis()
+    prepared, plain = _prepared_of(conclusion, law), Hypothesis()
     needed = ("torque_Nm", "motor_angle_rad", "load_angle_rad")
-    if not set(needed) <= set(bench.channels):
+    if not set(needed) <= set(prepared.channels):
         return None
-    problem, fit, ratio = conclusion.problem, conclusion.fit, bench.where.ratio
-    machines = [problem.trial_machine(bench, fit.hypothesis, fit.x),
-                problem.trial_machine(bench, plain, problem.start(plain))]  # fmt: skip
+    problem, fit, ratio = conclusion.problem, conclusion.fit, prepared.where.ratio
+    machines = [problem.trial_machine(prepared, fit.hypothesis, fit.x),
+                problem.trial_machine(prepared, plain, problem.start(plain))]  # fmt: skip
     column = {name: j for j, name in enumerate(CHANNELS)}
-    with_law, without = bench.runs(machines)
-    torque, motor, load = (bench.measured[:, bench.channels.index(name)] for name in needed)
+    with_law, without = prepared.runs(machines)
+    torque, motor, load = (prepared.measured[:, prepared.channels.index(name)] for name in needed)
     at = [column[name] for name in needed[1:]]
     deflection = with_law[:, at[0]] / ratio - with_law[:, at[1]]
     simulated = with_law[:, column["torque_Nm"]]
@@ -96,12 +96,13 @@ def _loop(conclusion: Conclusion, law: Law) -> dict | None:
     order = np.argsort(straight)
     nominal = np.interp(deflection, straight[order], without[order, column["torque_Nm"]])
     return {
-        "title": f"Torque over deflection in {bench.recording.file}",
+        "title": f"Torque over deflection in {prepared.recording.file}",
         "x_label": "deflection (rad)", "y_label": "torque (Nm)", "x": deflection,
         "nominal": nominal, "found": simulated, "low": simulated, "high": simulated,
         "points": (motor / ratio - load, torque),
-        "caption": f"The loop in {bench.recording.file}. Points: torque read, over the deflection"
-        " that the encoders read; lines: simulated with the law and with the nominal machine.",
+        "caption": f"The loop in {prepared.recording.file}. Points: torque read, over the"
+        " deflection that the encoders read; lines: simulated with the law and with the nominal"
+        " machine.",
     }  # fmt: skip
 
 
@@ -111,15 +112,15 @@ def _curve(conclusion: Conclusion, j: int, law: Law, ranges: Ranges) -> dict | N
     if grid is None:
         return None
     problem, fit = conclusion.problem, conclusion.fit
-    bench = _bench_of(conclusion, law)
+    prepared = _prepared_of(conclusion, law)
 
     def at(x: NDArray) -> NDArray:
         values = problem.values(fit.hypothesis, x)[1][j]
-        return drawn.evaluate(problem.trial_machine(bench, fit.hypothesis, x), values, grid)
+        return drawn.evaluate(problem.trial_machine(prepared, fit.hypothesis, x), values, grid)
 
     plain = Hypothesis()
     found = at(fit.x)
-    nominal = drawn.evaluate(problem.trial_machine(bench, plain, problem.start(plain)), {}, grid)
+    nominal = drawn.evaluate(problem.trial_machine(prepared, plain, problem.start(plain)), {}, grid)
     offsets = STEP * np.eye(fit.x.size)
     derivatives = np.array([(at(fit.x + d) - at(fit.x - d)) / (2.0 * STEP) for d in offsets])
     band = 1.96 * np.sqrt([conclusion.spread.variance(slope) for slope in derivatives.T])
@@ -129,7 +130,7 @@ def _curve(conclusion: Conclusion, j: int, law: Law, ranges: Ranges) -> dict | N
     }  # fmt: skip
 
 
-def _bench_of(conclusion: Conclusion, law: Law) -> Bench:
+def _prepared_of(conclusion: Conclusion, law: Law) -> PreparedRecording:
     """A recording that the law acts in."""
     fitted = conclusion.problem.fitted
     if law.only is not None:

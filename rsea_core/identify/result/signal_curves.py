@@ -28,10 +28,10 @@ def curves(
     """
     problem, plain = conclusion.problem, Hypothesis()
     rows = {(r["file"], r["signal"]): r for r in table}
-    benches = sorted(problem.benches, key=lambda b: b.recording.role != "validation")
+    recordings = sorted(problem.prepared, key=lambda b: b.recording.role != "validation")
     found: list[dict] = []
-    for bench in benches:
-        r = bench.recording
+    for prepared in recordings:
+        r = prepared.recording
         mine = sorted(
             (row for (file, _), row in rows.items() if file == r.file),
             key=lambda row: -row["nrmse_before"],
@@ -47,11 +47,11 @@ def curves(
             "after": (conclusion.fit.hypothesis, conclusion.fit.x),
         }
         simulated = {
-            name: conclusion.predicted(bench, hypothesis, x)
+            name: conclusion.predicted(prepared, hypothesis, x)
             for name, (hypothesis, x) in runs.items()
         }
         for row in mine[:2]:
-            j = bench.channels.index(row["signal"])
+            j = prepared.channels.index(row["signal"])
             found.append(
                 {
                     "file": r.file,
@@ -60,7 +60,7 @@ def curves(
                     "signal": row["signal"],
                     "unit": row["signal"].rsplit("_", 1)[-1],
                     "time_s": r.time_s - r.time_s[0],
-                    "recorded": bench.measured[:, j],
+                    "recorded": prepared.measured[:, j],
                     **{name: y[:, j] for name, y in simulated.items()},
                     "noise_floor": row["noise_floor"],
                     **{f"nrmse_{name}": row[f"nrmse_{name}"] for name in runs},

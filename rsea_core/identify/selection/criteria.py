@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
-from rsea_core.identify.fitting.problem import Bench, Problem
+from rsea_core.identify.fitting.problem import PreparedRecording, Problem
 from rsea_core.identify.selection.screening import Candidate
 
 # Thresholds: what each is, what it was set on and what guards it stands in `judgement.thresholds`.
@@ -139,8 +139,8 @@ class Search:
     nominal_msni: NDArray
     parameters: Fit
     effort: Effort = FULL
-    short: list[Bench] = field(default_factory=list)
-    longer: list[Bench] = field(default_factory=list)
+    short: list[PreparedRecording] = field(default_factory=list)
+    longer: list[PreparedRecording] = field(default_factory=list)
     candidates: list[Candidate] = field(default_factory=list)
     fits: dict[str, Fit] = field(default_factory=dict)
     predicted: dict[frozenset[str], Fit] = field(default_factory=dict)
@@ -164,7 +164,7 @@ class Search:
         return self.likelihood(fit.msni) - fit.prior_cost - PRICE * free
 
     def likelihood(self, msni: NDArray) -> float:
-        """Log-likelihood of MSNI (benches,) of free or short runs; -inf where one failed."""
+        """Log-likelihood of MSNI (recordings,) of free or short runs; -inf where one failed."""
         if not np.all(np.isfinite(msni)):
             return -np.inf
         return -0.5 * float(
@@ -190,10 +190,10 @@ class Search:
         return gap + (TEMPERATURE - 1.0) * max(dearer, 0.0)
 
     def short_msni(self, fit: Fit) -> NDArray:
-        """Powers (benches,) of a hypothesis fitted to short runs, from a fit to free ones."""
+        """Powers (recordings,) of a hypothesis fitted to short runs, from a fit to free ones."""
         known = self._short_msni.get(fit.hypothesis.key)
         if known is None:
-            begun = self.fitter.fit(fit.hypothesis, fit.x, iterations=6, benches=self.short)
+            begun = self.fitter.fit(fit.hypothesis, fit.x, iterations=6, recordings=self.short)
             _, there, _ = self.fitter.evaluate(fit.hypothesis, fit.x[None], self.short)
             known = begun.msni if begun.msni.sum() < there[0].sum() else there[0]
             self._short_msni[fit.hypothesis.key] = known

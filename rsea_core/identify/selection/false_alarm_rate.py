@@ -17,7 +17,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording, Problem
 from rsea_core.identify.selection.criteria import FALSE_ALARMS
 from rsea_core.identify.smoothing.whitening import Whitener
 
@@ -25,17 +25,19 @@ REPLAYS = 4
 EULER = 0.5772156649
 
 
-def bootstrap_benches(problem: Problem, fit: Fit, rng: np.random.Generator) -> list[Bench]:
-    """The fitted benches as if the fit were the truth, with noise drawn anew."""
+def bootstrap_recordings(
+    problem: Problem, fit: Fit, rng: np.random.Generator
+) -> list[PreparedRecording]:
+    """The fitted recordings as if the fit were the truth, with noise drawn anew."""
     plain = Hypothesis()
     found = []
-    for bench in problem.fitted:
-        expected = problem.predict(bench, plain, fit.x[None])[0]
-        noise = np.repeat(coloured(bench.whitener, rng), bench.whitener.block, axis=0)
+    for prepared in problem.fitted:
+        expected = problem.predict(prepared, plain, fit.x[None])[0]
+        noise = np.repeat(coloured(prepared.whitener, rng), prepared.whitener.block, axis=0)
         rows = len(noise)
-        measured = bench.measured.copy()
+        measured = prepared.measured.copy()
         measured[:rows] = expected[:rows] + noise
-        found.append(replace(bench, measured=measured))
+        found.append(replace(prepared, measured=measured))
     return found
 
 
@@ -92,5 +94,7 @@ def bootstrap_gains(
     rng = np.random.default_rng(seed)
     gains = []
     for number in range(replays):
-        gains.append(search_gain(problem.with_fitted(bootstrap_benches(problem, fit, rng)), number))
+        gains.append(
+            search_gain(problem.with_fitted(bootstrap_recordings(problem, fit, rng)), number)
+        )
     return gains

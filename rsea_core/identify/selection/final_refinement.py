@@ -17,7 +17,12 @@ from rsea_core.errors import RecordingError
 from rsea_core.identify.fitting.cross_validation import fit_windows, windowed
 from rsea_core.identify.fitting.jacobian import free_factors, jacobian_at, moved_along
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem, predict_readings
+from rsea_core.identify.fitting.problem import (
+    Hypothesis,
+    PreparedRecording,
+    Problem,
+    predict_readings,
+)
 from rsea_core.identify.fitting.window_predictions import WINDOW_s
 from rsea_core.identify.selection.criteria import (
     FREE_RUN_WORSE,
@@ -191,7 +196,7 @@ def free_run_errors(
     problem: Problem,
     hypothesis: Hypothesis,
     x: NDArray,
-    benches: Sequence[Bench],
+    recordings: Sequence[PreparedRecording],
     *,
     without: str = "",
 ) -> NDArray:
@@ -205,12 +210,12 @@ def free_run_errors(
         A column that is left out.
     """
     found = []
-    for bench in benches:
-        machine = problem.trial_machine(bench, hypothesis, x)
-        y = predict_readings(bench.replay, [machine], bench.channels, bench.where)[0]
-        floors = np.array([bench.floors[name] for name in bench.channels])
-        rms = np.sqrt(np.mean((y - bench.measured) ** 2, axis=0) + floors**2)
-        spread = np.std(bench.measured, axis=0)
-        used = (spread > 0.0) & np.array([name != without for name in bench.channels])
+    for prepared in recordings:
+        machine = problem.trial_machine(prepared, hypothesis, x)
+        y = predict_readings(prepared.replay, [machine], prepared.channels, prepared.where)[0]
+        floors = np.array([prepared.floors[name] for name in prepared.channels])
+        rms = np.sqrt(np.mean((y - prepared.measured) ** 2, axis=0) + floors**2)
+        spread = np.std(prepared.measured, axis=0)
+        used = (spread > 0.0) & np.array([name != without for name in prepared.channels])
         found.append(rms[used] / spread[used])
     return np.concatenate(found)

@@ -153,11 +153,11 @@ def more_harmonics(search: Search, fit: Fit, say) -> Fit:
         others = [cogging(typical, (c,)) for c in CYCLES_TRIED if c not in cycles]
         tempering = tempering_of(best.msni)
         begun = fitter.fit(
-            best.hypothesis, best.x, iterations=4, benches=search.short, tempering=tempering
+            best.hypothesis, best.x, iterations=4, recordings=search.short, tempering=tempering
         )
         found = screen(
             fitter, best.hypothesis, begun.x, others, tempering=tempering_of(begun.msni),
-            benches=search.short,
+            recordings=search.short,
         )  # fmt: skip
         if not found:
             return best
@@ -167,8 +167,10 @@ def more_harmonics(search: Search, fit: Fit, say) -> Fit:
         n = len(search.problem.nominals)
         own = search.problem.start(Hypothesis(laws=(wave.law,)), [wave.start])[n:]
         x = np.concatenate([begun.x + wave.shift, own])
-        for benches in (search.short, search.longer, None):
-            rich = fitter.fit(hypothesis, x, iterations=5, benches=benches, tempering=tempering)
+        for recordings in (search.short, search.longer, None):
+            rich = fitter.fit(
+                hypothesis, x, iterations=5, recordings=recordings, tempering=tempering
+            )
             x = rich.x
         search.keep(rich)
         say(f"  more waves {law.key}: MSNI {formatted(rich.msni)}, score {search.score(rich):.1f}")

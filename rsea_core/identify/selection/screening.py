@@ -18,7 +18,7 @@ from rsea_core.effects.motor_cogging import MotorCogging
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import STEP, Fitter, robust
 from rsea_core.identify.fitting.periodic_regressors import periodic_columns, torque_columns
-from rsea_core.identify.fitting.problem import Bench, Hypothesis
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,11 +37,11 @@ class Candidate:
         Of the squared innovations that no parameter can mimic.
     column : (n,) array
         Unit vector of the law's own direction, parameters projected out.
-    by_bench : (benches,) array
+    by_recording : (recordings,) array
         How the fall divides over the recordings.
     shift : (n,) array
         How the base's unknowns move with it.
-    kept : (benches,) array
+    kept : (recordings,) array
         Share of each recording's squared innovations that would be left.
     """
 
@@ -51,7 +51,7 @@ class Candidate:
     size: float
     share: float
     column: NDArray
-    by_bench: NDArray
+    by_recording: NDArray
     shift: NDArray
     kept: NDArray
 
@@ -76,7 +76,7 @@ def screen(
     laws: Sequence[Law],
     *,
     tempering: float,
-    benches: Sequence[Bench] | None = None,
+    recordings: Sequence[PreparedRecording] | None = None,
 ) -> list[Candidate]:
     """Candidates in the order of their predicted fall.
 
@@ -86,15 +86,15 @@ def screen(
         Fitted unknowns of the base hypothesis.
     tempering : float
         As in `Fitter.fit`.
-    benches : sequence of Bench or None
+    recordings : sequence of PreparedRecording or None
         The recordings as they are replayed; None: free runs of all that are fitted.
     """
-    linear = _linearised(fitter, base, x, tempering, benches)
+    linear = _linearised(fitter, base, x, tempering, recordings)
     periodic = [law for law in laws if law.effect == MotorCogging.effect]
     smooth = [law for law in laws if law not in periodic]
-    columns = _replayed_columns(fitter, base, x, smooth, benches, linear)
+    columns = _replayed_columns(fitter, base, x, smooth, recordings, linear)
     if periodic:
-        used = benches or fitter.problem.fitted
+        used = recordings or fitter.problem.fitted
         columns |= _periodic_columns(fitter.problem, periodic, linear.root, used)
     found = [_best_start(linear, law, columns) for law in laws]
     results = sorted((c for c in found if c is not None), key=lambda c: -c.drop)
@@ -123,7 +123,7 @@ class _Linear:
         Weighted innovations that re-fitted unknowns leave, with the sign of a step.
     total : float
         Sum of its squares.
-    edges : (benches + 1,) array
+    edges : (recordings + 1,) array
         Where a recording's innovations begin.
     """
 
@@ -139,10 +139,14 @@ class _Linear:
 
 
 def _linearised(
-    fitter: Fitter, base: Hypothesis, x: NDArray, tempering: float, benches: Sequence[Bench] | None
+    fitter: Fitter,
+    base: Hypothesis,
+    x: NDArray,
+    tempering: float,
+    recordings: Sequence[PreparedRecording] | None,
 ) -> _Linear:
     X = np.vstack([x, *(x + STEP * np.eye(x.size))])
-    _, _, found = fitter.evaluate(base, X, benches)
+    _, _, found = fitter.evaluate(base, X, recordings)
     flat = np.concatenate([e.reshape(len(X), -1) for e in found], axis=1)
     e0 = flat[0]
     root = np.ones_like(e0) if np.isinf(fitter.far) else np.sqrt(robust(e0, fitter.far)[1])
@@ -164,7 +168,7 @@ def _linearised(
 
 
 def _replayed_columns(
-    fitter: Fitter, base: Hypothesis, x: NDArray, laws: Sequence[Law], benches, linear: _Linear
+    fitter: Fitter, base: Hypothesis, x: NDArray, laws: Sequence[Law], recordings, linear: _Linear
 ) -> dict[tuple, NDArray]:
     """What each law changes (n,) by (key, start), pairs also a quarter of a turn on."""
     jobs = [
@@ -179,7 +183,7 @@ def _replayed_columns(
         own = problem.start(Hypothesis(laws=(law,)), [start])[len(problem.nominals) :]
         trials.append((Hypothesis(laws=(*base.laws, law)), np.concatenate([x, own])))
     fitter.replays += len(trials)
-    parts = problem.innovations_of(trials, benches) if trials else []
+    parts = problem.innovations_of(trials, recordings) if trials else []
     columns = {}
     for j, (law, start) in enumerate(jobs):
         e = np.concatenate([part[j].reshape(-1) for part in parts])
@@ -245,11 +249,11 @@ def _judge(
         return None
     unit = direction / norm
     along = unit * left
-    by_bench = np.array([along[a:b].sum() for a, b in itertools.pairwise(edges)])
-    overall = by_bench.sum()
+    by_recording = np.array([along[a:b].sum() for a, b in itertools.pairwise(edges)])
+    overall = by_recording.sum()
     shift = -np.linalg.solve(L.T, B @ size)
     share = float((unit @ left) ** 2 / linear.total) if linear.total > 0.0 else 0.0
-    had, stays = _by_bench(left, edges), _by_bench(left - direction, edges)
+    had, stays = _by_recording(left, edges), _by_recording(left - direction, edges)
     scale = float(np.hypot(*size)) if turned is not None else float(size[0])
     begun = start
     if turned is not None:
@@ -258,13 +262,13 @@ def _judge(
     return Candidate(
         law=law, start=begun, drop=drop, size=scale, share=share,
         column=unit.astype(np.float32),
-        by_bench=by_bench / overall if overall else by_bench, shift=shift,
+        by_recording=by_recording / overall if overall else by_recording, shift=shift,
         kept=stays / np.maximum(had, 1e-300),
     )  # fmt: skip
 
 
-def _by_bench(e: NDArray, edges: NDArray) -> NDArray:
-    """Sums of squares (benches,) of all recordings' innovations (n,) side by side."""
+def _by_recording(e: NDArray, edges: NDArray) -> NDArray:
+    """Sums of squares (recordings,) of all recordings' innovations (n,) side by side."""
     return np.array([float(e[a:b] @ e[a:b]) for a, b in itertools.pairwise(edges)])
 
 
@@ -280,20 +284,20 @@ def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]
 
 
 def _periodic_columns(
-    problem, periodic: Sequence[Law], root: NDArray, benches: Sequence[Bench]
+    problem, periodic: Sequence[Law], root: NDArray, recordings: Sequence[PreparedRecording]
 ) -> dict[tuple, NDArray]:
     """Columns of torques periodic in the motor's angle, from the measured angle."""
     stiffness = problem.case.rig.spring_stiffness_Nm_per_rad or 0.0
     parts: list[NDArray] = []
     cycles = [law.starts[0][2] for law in periodic]
-    for bench in benches:
-        size = bench.whitener.size
-        if "motor_angle_rad" not in bench.recording:
+    for prepared in recordings:
+        size = prepared.whitener.size
+        if "motor_angle_rad" not in prepared.recording:
             parts.append(np.zeros((2 * len(periodic), size)))
             continue
-        angle = bench.recording["motor_angle_rad"]
-        signals = -bench.where.ratio * periodic_columns(angle, cycles)
-        e = torque_columns(bench, stiffness, signals, "G")
+        angle = prepared.recording["motor_angle_rad"]
+        signals = -prepared.where.ratio * periodic_columns(angle, cycles)
+        e = torque_columns(prepared, stiffness, signals, "G")
         parts.append(-e.reshape(len(signals), -1))
     whole = np.concatenate(parts, axis=1) * root
     found = {}

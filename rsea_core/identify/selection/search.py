@@ -17,7 +17,7 @@ from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.candidates.typical_magnitudes import typical_magnitudes_of
 from rsea_core.identify.fitting.least_squares import Fit, Fitter
 from rsea_core.identify.fitting.problem import Hypothesis, Problem, require_replays
-from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
+from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, prepared_for_short_runs
 from rsea_core.identify.locate.pulse_detection import disturbances
 from rsea_core.identify.selection.common_scale_factor import reading_scale
 from rsea_core.identify.selection.criteria import (
@@ -95,7 +95,7 @@ def investigate(
         problem=problem, fitter=fitter, nominal_msni=msni[0], parameters=first, effort=effort
     )
     if not np.all(first.msni < QUIET_MSNI):
-        search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
+        search.short, search.longer = prepared_for_short_runs(problem, SHORT_s, LONGER_s)
         first = search.parameters = _followed(search, first, say)
     first = settle(search, first, say)
     if effort.from_prior:
@@ -109,7 +109,7 @@ def investigate(
         search.best = reading_scale(search, first, laws, say)  # or all moved by a common factor
         return search
     if not search.short:
-        search.short, search.longer = short_benches(problem, SHORT_s, LONGER_s)
+        search.short, search.longer = prepared_for_short_runs(problem, SHORT_s, LONGER_s)
     best = _first_effect(search, laws, say)
     if best is not first:
         best = _further_effects(search, best, laws, say, effort.effects if depth is None else depth)
@@ -227,10 +227,10 @@ def _false_alarm_threshold(search: Search, best: Fit, laws: dict[str, Law], say)
 def _followed(search: Search, first: Fit, say) -> Fit:
     """Parameters alone, followed from short runs to free ones, where that ends better."""
     fitter = search.fitter
-    fit = fitter.fit(first.hypothesis, first.x, iterations=8, benches=search.short)
-    for benches, iterations in ((search.longer, 6), (None, 12)):
+    fit = fitter.fit(first.hypothesis, first.x, iterations=8, recordings=search.short)
+    for recordings, iterations in ((search.longer, 6), (None, 12)):
         fit = fitter.fit(
-            first.hypothesis, fit.x, iterations=iterations, benches=benches,
+            first.hypothesis, fit.x, iterations=iterations, recordings=recordings,
             tempering=tempering_of(fit.msni),
         )  # fmt: skip
     better = search.score(fit) > search.score(first)

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Bench, Hypothesis, Problem
+from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording, Problem
 from rsea_core.identify.selection.criteria import (
     CLOSE,
     LAWS_TRIED,
@@ -55,7 +55,7 @@ def begun(
     base: Fit,
     chosen: Sequence[Candidate],
     tried: int,
-    benches: Sequence[Bench] | None = None,
+    recordings: Sequence[PreparedRecording] | None = None,
 ) -> list[tuple[Hypothesis, NDArray]]:
     """Where the best candidates' fits begin.
 
@@ -83,7 +83,7 @@ def begun(
             own = problem.start(Hypothesis(laws=(c.law,)), [start])[n:]
             trials.append((hypothesis, np.clip(np.concatenate([prior_mean, own]), low, high)))
             labels.append((c.law.key, "prior"))
-    costs = fitter.costs(trials, benches)
+    costs = fitter.costs(trials, recordings)
     best: dict[tuple[str, str], int] = {}
     for j in np.argsort(costs):
         if np.isfinite(costs[j]):
@@ -224,13 +224,13 @@ def from_short_runs(
         Laws that begin for what they explain, and for returning parameters to their priors.
     """
     fitter = search.fitter
-    start = fitter.fit(base.hypothesis, base.x, iterations=8, benches=search.short)
+    start = fitter.fit(base.hypothesis, base.x, iterations=8, recordings=search.short)
     tempering = tempering_of(start.msni)
     start = fitter.fit(
-        base.hypothesis, start.x, iterations=4, benches=search.short, tempering=tempering
+        base.hypothesis, start.x, iterations=4, recordings=search.short, tempering=tempering
     )
     found = screen(
-        fitter, base.hypothesis, start.x, open_laws, tempering=tempering, benches=search.short
+        fitter, base.hypothesis, start.x, open_laws, tempering=tempering, recordings=search.short
     )
     chosen = chosen_of(found, 2 * tried) if tried else []
     restoring = (
@@ -246,7 +246,7 @@ def from_short_runs(
     if restoring:
         firsts = firsts + begun(search, start, restoring, count_restoring, search.short)
     for hypothesis, x0 in firsts:
-        fit = fitter.fit(hypothesis, x0, iterations=5, benches=search.short, tempering=tempering)
+        fit = fitter.fit(hypothesis, x0, iterations=5, recordings=search.short, tempering=tempering)
         met = next((j for j, other in enumerate(begins) if _met(fit, other)), None)
         if met is None:
             begins.append(fit)
@@ -260,7 +260,7 @@ def from_short_runs(
             say(f"{line}, not followed")
             continue
         fit = fitter.fit(
-            begin.hypothesis, begin.x, iterations=4, benches=search.longer, tempering=tempering
+            begin.hypothesis, begin.x, iterations=4, recordings=search.longer, tempering=tempering
         )
         line += f", longer {formatted(fit.msni)}"
         fit = fitter.fit(fit.hypothesis, fit.x, iterations=3, tempering=tempering_of(base.msni))

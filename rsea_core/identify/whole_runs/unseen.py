@@ -51,7 +51,7 @@ def unseen_share(found: Found, own: Estimator, fit: Estimate, plain: Estimate, s
     before, after = (max(_left_unseen(own, f), 0.0) for f in (plain, fit))
     share = after / before if before > 0.0 else 1.0
     say(f"  whole recordings: of rows unseen {share:.2f} of what parameters leave remains")
-    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    unseen = [b for b in found.problem.prepared if b.recording.role == "validation"]
     added = [law for law in fit.hypothesis.laws if law not in plain.hypothesis.laws]
     if share >= UNPREDICTED or not unseen:
         return share
@@ -70,7 +70,7 @@ def unpredicted_recordings(found: Found) -> list[str]:
 
     Parameters suffice for what the recordings fitted show; a faster or larger motion may show more.
     """
-    if not any(b.recording.role == "validation" for b in found.problem.benches):
+    if not any(b.recording.role == "validation" for b in found.problem.prepared):
         return []
     own = in_sensor_noise(found.base_estimator, found.base)
     plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
@@ -91,7 +91,7 @@ def recordings_held_out(
     The start is smoothed in the noise of windows, unknown torques included: in the sensors' noise
     alone what the smoother's model lacks, as a flexible link, moves the start.
     """
-    unseen = [b for b in found.problem.benches if b.recording.role == "validation"]
+    unseen = [b for b in found.problem.prepared if b.recording.role == "validation"]
     like = replace(found, estimator=found.base_estimator, horizon=None)
     begun = in_sensor_noise(of_recordings(like, unseen, trial, None))
     noises = {t.experiment.channels: t.noise for t in own.tracks}

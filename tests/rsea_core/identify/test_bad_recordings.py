@@ -52,9 +52,9 @@ def test_a_torque_on_a_wheel_that_is_held_moves_nothing():
         where="test",
     )  # fmt: skip
     held = problem(400, "motor_angle_rad", "current_A", rig=rigid)
-    (bench,) = held.benches
+    (prepared,) = held.prepared
     found = torque_columns(
-        bench, 0.0, periodic_columns(bench.recording["motor_angle_rad"], [1]), "G"
+        prepared, 0.0, periodic_columns(prepared.recording["motor_angle_rad"], [1]), "G"
     )
     assert found.shape == (
         2,

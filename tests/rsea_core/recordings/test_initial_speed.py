@@ -51,9 +51,9 @@ def case(r: Recording) -> Case:
 def left(r: Recording) -> float:
     """Largest error of the nominal machine's free run [m]."""
     problem, plain = Problem(case(r)), Hypothesis()
-    bench = problem.benches[0]
-    y = problem.predict(bench, plain, problem.start(plain)[None])[0]
-    return float(np.max(np.abs(y - bench.measured)))
+    prepared = problem.prepared[0]
+    y = problem.predict(prepared, plain, problem.start(plain)[None])[0]
+    return float(np.max(np.abs(y - prepared.measured)))
 
 
 @pytest.mark.parametrize("speed", [0.0, -0.3, 2.0])

@@ -48,12 +48,12 @@ def test_a_thread_that_fades_slides_with_the_level_of_its_speed():
 def read_from(problem: Problem, hypothesis: Hypothesis, x, seed: int) -> Problem:
     """The problem on noisy readings of a hypothesis."""
     rng = np.random.default_rng(seed)
-    benches = []
-    for bench in problem.fitted:
-        expected = problem.predict(bench, hypothesis, x[None])[0]
-        noise = np.repeat(coloured(bench.whitener, rng), bench.whitener.block, axis=0)
-        benches.append(replace(bench, measured=expected[: len(noise)] + QUIET * noise))
-    return problem.with_fitted(benches)
+    recordings = []
+    for prepared in problem.fitted:
+        expected = problem.predict(prepared, hypothesis, x[None])[0]
+        noise = np.repeat(coloured(prepared.whitener, rng), prepared.whitener.block, axis=0)
+        recordings.append(replace(prepared, measured=expected[: len(noise)] + QUIET * noise))
+    return problem.with_fitted(recordings)
 
 
 def test_efficiencies_are_right_where_constants_would_hide_that_friction_fades(tmp_path):

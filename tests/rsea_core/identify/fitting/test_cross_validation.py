@@ -25,7 +25,7 @@ FRICTION = {
 def test_the_true_machine_predicts_windows_down_to_the_sensor(tmp_path):
     problem = Problem(carriage_case(tmp_path), step_s=1e-3)
     plain = Hypothesis()
-    pieces = [cut(problem, problem.benches[0], 2.0)]
+    pieces = [cut(problem, problem.prepared[0], 2.0)]
     error = window_errors(problem, plain, problem.start(plain), pieces)[0]
     assert error.windows == 5
     assert error.rmse < 2e-5  # the start's speed is smoothed from readings of 2e-6
@@ -37,7 +37,7 @@ def test_a_force_that_is_not_modelled_makes_the_error_of_a_free_mass(tmp_path):
     problem = Problem(carriage_case(tmp_path, offset=force), step_s=1e-3)
     plain = Hypothesis()
     error = window_errors(
-        problem, plain, problem.start(plain), [cut(problem, problem.benches[0], T)]
+        problem, plain, problem.start(plain), [cut(problem, problem.prepared[0], T)]
     )[0]
     M, B = CARRIAGE["load_inertia_kgm2"], CARRIAGE["load_viscous_Nms_per_rad"]
     t = np.linspace(0.0, T, 20001)

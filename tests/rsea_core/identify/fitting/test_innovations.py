@@ -20,7 +20,7 @@ def test_innovations_of_the_true_machine_are_noise_of_unit_power(tmp_path):
     plain = Hypothesis()
     _, power, found = Fitter(problem).evaluate(plain, problem.start(plain)[None])
     assert np.all(power < 1.3)
-    e = found[1][0, 50:, problem.benches[1].channels.index("torque_Nm")]
+    e = found[1][0, 50:, problem.prepared[1].channels.index("torque_Nm")]
     assert abs(np.corrcoef(e[1:], e[:-1])[0, 1]) < 0.1
     assert np.std(e) == pytest.approx(1.0, abs=0.1)
 

@@ -37,9 +37,9 @@ def moved_by_hand(folder, read_rad: np.ndarray) -> MultistepProblem:
 
 
 def predicted_motor_rad(problem: MultistepProblem, h: Hypothesis, x, windows) -> np.ndarray:
-    bench = problem.fitted[0]
-    machine = [problem.trial_machine(bench, h, x)]
-    return bench.readings(bench.runs(machine, windows), machine, windows)[0][:, 0]
+    prepared = problem.fitted[0]
+    machine = [problem.trial_machine(prepared, h, x)]
+    return prepared.readings(prepared.runs(machine, windows), machine, windows)[0][:, 0]
 
 
 @pytest.mark.parametrize("cut", [False, True])

@@ -18,10 +18,10 @@ from rsea_core.engines.fixed_step.body_steps import NO_FRICTION, Body, bristle_s
 from rsea_core.identify.candidates.catalogue import catalogue
 from rsea_core.identify.fitting.least_squares import Fitter
 from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, short_benches
+from rsea_core.identify.fitting.short_windows import LONGER_s, SHORT_s, prepared_for_short_runs
 from rsea_core.identify.judgement.unmodelled_gravity import gravity_moved
 from rsea_core.identify.selection.false_alarm_rate import (
-    bootstrap_benches,
+    bootstrap_recordings,
     coloured,
     false_alarm_threshold,
 )
@@ -40,20 +40,20 @@ def test_short_runs_of_the_true_machine_leave_noise(dry):
     true = Hypothesis(laws=(law,))
     x = dry.start(true, [(0.05,)])
     fitter = Fitter(dry)
-    for benches in short_benches(dry, SHORT_s, LONGER_s):
-        _, power, _ = fitter.evaluate(true, x[None], benches)
+    for recordings in prepared_for_short_runs(dry, SHORT_s, LONGER_s):
+        _, power, _ = fitter.evaluate(true, x[None], recordings)
         assert np.all(power < 1.6), "the true machine from smoothed starts"
-        _, without, _ = fitter.evaluate(Hypothesis(), x[None, :-1], benches)
+        _, without, _ = fitter.evaluate(Hypothesis(), x[None, :-1], recordings)
         assert np.all(without > 5.0 * power), "the same without its friction"
 
 
 def test_windows_cover_every_row_once(dry):
-    for bench in short_benches(dry, 0.3)[0]:
-        first, last = bench.windows.rows.T
+    for prepared in prepared_for_short_runs(dry, 0.3)[0]:
+        first, last = prepared.windows.rows.T
         assert first[0] == 0
-        assert last[-1] == bench.recording.rows - 1
+        assert last[-1] == prepared.recording.rows - 1
         np.testing.assert_array_equal(first[1:], last[:-1] + 1)
-        assert np.all(first % bench.whitener.block == 0)
+        assert np.all(first % prepared.whitener.block == 0)
 
 
 def test_innovations_made_during_the_replay_are_those_of_the_residuals(dry):
@@ -66,12 +66,12 @@ def test_innovations_made_during_the_replay_are_those_of_the_residuals(dry):
                 "sensor-scale/factor@torque_Nm", "sensor-offset/constant@torque_Nm"):  # fmt: skip
         hypothesis = Hypothesis(laws=(laws[key],))
         trials.append((hypothesis, dry.start(hypothesis)))
-    for benches in (dry.fitted, short_benches(dry, 0.3)[0]):
-        found = dry.innovations_of(trials, benches)
-        for bench, e in zip(benches, found, strict=True):
+    for recordings in (dry.fitted, prepared_for_short_runs(dry, 0.3)[0]):
+        found = dry.innovations_of(trials, recordings)
+        for prepared, e in zip(recordings, found, strict=True):
             for (hypothesis, at), own in zip(trials, e, strict=True):
-                left = bench.measured[None] - dry.predict(bench, hypothesis, at[None])
-                np.testing.assert_allclose(own, bench.whitener(left)[0], rtol=1e-7, atol=1e-7)
+                left = prepared.measured[None] - dry.predict(prepared, hypothesis, at[None])
+                np.testing.assert_allclose(own, prepared.whitener(left)[0], rtol=1e-7, atol=1e-7)
                 assert np.std(own) > 0.5
 
 
@@ -102,10 +102,10 @@ def test_strong_cogging_that_throws_free_runs_out_of_step_is_found(tmp_path):
 
 def test_noise_drawn_for_a_replay_is_whitened_to_unit_power(dry):
     rng = np.random.default_rng(5)
-    for bench in dry.fitted:
-        noise = coloured(bench.whitener, rng)
-        rows = np.repeat(noise, bench.whitener.block, axis=0)
-        white = bench.whitener(rows[None])[0]
+    for prepared in dry.fitted:
+        noise = coloured(prepared.whitener, rng)
+        rows = np.repeat(noise, prepared.whitener.block, axis=0)
+        white = prepared.whitener(rows[None])[0]
         assert np.mean(white**2) == pytest.approx(1.0, abs=0.06)
         lag = np.mean(white[1:] * white[:-1], axis=0)
         assert np.all(np.abs(lag) < 4.0 / np.sqrt(len(white)))
@@ -114,7 +114,7 @@ def test_noise_drawn_for_a_replay_is_whitened_to_unit_power(dry):
 def test_a_replay_of_the_null_is_explained_by_its_parameters(dry):
     plain = Hypothesis()
     fit = Fitter(dry).fit(plain, dry.start(plain), iterations=2)
-    replayed = dry.with_fitted(bootstrap_benches(dry, fit, np.random.default_rng(0)))
+    replayed = dry.with_fitted(bootstrap_recordings(dry, fit, np.random.default_rng(0)))
     _, power, _ = Fitter(replayed).evaluate(plain, fit.x[None])
     np.testing.assert_allclose(power, 1.0, atol=0.1)
 

@@ -41,7 +41,7 @@ class Made:
     def prior(self, hypothesis):
         return np.zeros(len(self.nominals)), np.ones(len(self.nominals))
 
-    def innovations(self, hypothesis, X, benches=None):
+    def innovations(self, hypothesis, X, recordings=None):
         return [np.array([self.function(x)[:, None] for x in X])]
 
 

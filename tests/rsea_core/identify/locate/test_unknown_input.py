@@ -29,7 +29,7 @@ from tests.cases.planted import misread, parameters_of, planted
 def test_the_likelihood_of_readings_is_that_of_the_dense_gaussian(tmp_path):
     problem = planted(tmp_path)
     fit = Fitter(problem).fit(Hypothesis(), problem.start(Hypothesis()), iterations=1)
-    model = model_of(problem, fit, problem.benches[1])
+    model = model_of(problem, fit, problem.prepared[1])
     n, p = 12, len(model.channels)
     A, C, Q, P = model.with_input("G", 0.15)
     size = 0.3
@@ -100,9 +100,9 @@ def test_a_sensor_that_errs_by_no_known_law_is_located(tmp_path, column, error):
     search = parameters_of(misread(tmp_path, column, error))
     left = unexplained_residual(search)
     assert left.subsystem == f"sensor:{column}"
-    for trace, bench in zip(left.traces, search.problem.fitted, strict=True):
-        expected = error(bench.recording.time_s, bench.recording.columns)
-        there = np.interp(trace.time_s, bench.recording.time_s, expected)
+    for trace, prepared in zip(left.traces, search.problem.fitted, strict=True):
+        expected = error(prepared.recording.time_s, prepared.recording.columns)
+        there = np.interp(trace.time_s, prepared.recording.time_s, expected)
         if column != "torque_Nm":  # a clipped reading does not say what it would have been
             assert np.sqrt(np.mean((trace.value - there) ** 2)) < 0.3 * np.std(there) + 1e-3
     if column != "torque_Nm":  # without it the scale of all torques rests on the priors

@@ -23,7 +23,7 @@ def fitted(tmp_path_factory):
 
 
 def rows_cut(estimator):
-    return [e.finer for e in estimator.problem.benches]
+    return [e.finer for e in estimator.problem.prepared]
 
 
 def test_a_short_recording_keeps_parts_of_rows(fitted):

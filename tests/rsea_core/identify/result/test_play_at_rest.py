@@ -47,8 +47,10 @@ def _replayed(recording):
     problem = _problem(recording)
     hypothesis = Hypothesis(laws=(LAW,))
     x = problem.start(hypothesis, [tuple(VALUES.values())])
-    bench = problem.benches[0]
-    return problem.predict(bench, hypothesis, x[None])[0][:, bench.channels.index("torque_Nm")]
+    prepared = problem.prepared[0]
+    return problem.predict(prepared, hypothesis, x[None])[0][
+        :, prepared.channels.index("torque_Nm")
+    ]
 
 
 @pytest.mark.parametrize("torque", [0.4, -0.2])

@@ -15,7 +15,7 @@ from rsea_core.effects.layout import N_EFFECTS
 from rsea_core.effects.variant import RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Replay
 from rsea_core.identify.candidates.catalogue import catalogue
-from rsea_core.identify.fitting.peak_temperature import benches_with_test, peak_rise_K
+from rsea_core.identify.fitting.peak_temperature import peak_rise_K, recordings_with_test
 from rsea_core.identify.fitting.problem import Hypothesis, predict_readings
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.selection.final_refinement import worsens_free_runs
@@ -138,14 +138,14 @@ def test_the_winding_s_peak_counts_the_test_and_a_broken_test_is_left_out(tmp_pa
     x = problem.start(hypothesis)
 
     def peak() -> float:
-        return peak_rise_K(problem, hypothesis, x, benches_with_test(problem, 25.0))
+        return peak_rise_K(problem, hypothesis, x, recordings_with_test(problem, 25.0))
 
     alone = peak()
     folder = tmp_path / "test"
     folder.mkdir()
     (folder / "test.toml").write_text('[[recording]]\nfile = "gone.csv"\nload = "locked"\n')
     assert peak() == alone
-    time_s = np.arange(0.0, 8.0 * np.ptp(problem.benches[0].recording.time_s), 0.001)
+    time_s = np.arange(0.0, 8.0 * np.ptp(problem.prepared[0].recording.time_s), 0.001)
     np.savetxt(folder / "input.csv", np.column_stack([time_s, 0.4 + 0.0 * time_s]), delimiter=",",
                header="time_s,duty", comments="")  # fmt: skip
     (folder / "test.toml").write_text('[[recording]]\nfile = "input.csv"\nload = "locked"\n')
@@ -164,7 +164,7 @@ def test_effects_mislead_where_their_free_runs_are_worse(monkeypatch, worse):
     errors = {"plain": np.array([0.1, 0.2]), "law": np.array([0.3, 0.1] if worse else [0.05, 0.2])}
     monkeypatch.setattr(
         "rsea_core.identify.selection.final_refinement.free_run_errors",
-        lambda problem, h, x, benches, *, without: errors[h.key],
+        lambda problem, h, x, recordings, *, without: errors[h.key],
     )
     plain = SimpleNamespace(hypothesis=SimpleNamespace(key="plain", laws=()), x=None)
     law = SimpleNamespace(key="law", laws=("one",))

@@ -149,12 +149,14 @@ def test_an_external_torque_pulse_is_proposed_when_it_acted(tmp_path):
     plain = Hypothesis()
     fitter = Fitter(problem)
     fit = fitter.fit(plain, problem.start(plain), iterations=3)
-    bench = next(b for b in problem.fitted if b.where.kind == "pendulum")
-    pulse = disturbance("pendulum.csv", bench.where.index, (1.5, 0.4, 0.3), 0.5, 4.0)
+    prepared = next(b for b in problem.fitted if b.where.kind == "pendulum")
+    pulse = disturbance("pendulum.csv", prepared.where.index, (1.5, 0.4, 0.3), 0.5, 4.0)
     pushed = Hypothesis(laws=(pulse,))
     x = np.concatenate([fit.x, problem.start(Hypothesis(laws=(pulse,)))[fit.x.size :]])
-    moved = problem.predict(bench, pushed, x[None]) - problem.predict(bench, plain, fit.x[None])
-    bench.measured[:] += moved[0]
+    moved = problem.predict(prepared, pushed, x[None]) - problem.predict(
+        prepared, plain, fit.x[None]
+    )
+    prepared.measured[:] += moved[0]
     first = disturbances(fitter, fit, 0.5)[0]
     values = dict(
         zip((parameter.name for parameter in first.unknowns), first.starts[0], strict=True)
@@ -169,10 +171,10 @@ class _Staying:
     """A fitter whose fits stay where they begin; it notes what they were fitted to."""
 
     def __init__(self):
-        self.benches = []
+        self.prepared = []
 
-    def fit(self, hypothesis, x, *, benches=None, **_):
-        self.benches.append(benches)
+    def fit(self, hypothesis, x, *, recordings=None, **_):
+        self.prepared.append(recordings)
         return SimpleNamespace(hypothesis=hypothesis, x=x, msni=np.array(x), cost=-x[0])
 
 
@@ -192,7 +194,7 @@ def test_short_runs_that_met_are_followed_once_and_those_out_of_reach_not_at_all
         search, fitter.fit(a, [2.0]), [], reported.append, tried=3
     )
     assert [fit.msni[0] for fit in found] == [1.01, 1.5], "of two that met the better one"
-    assert fitter.benches.count("longer") == 2
+    assert fitter.prepared.count("longer") == 2
     assert sum("not followed" in line for line in reported) == 2
 
 
@@ -209,10 +211,10 @@ def test_a_richer_law_that_was_tried_from_a_better_fit_is_not_tried_again(tmp_pa
     )  # fmt: skip
     reported: list[str] = []
     assert with_richer_laws(search, fit, laws, set(richer), reported.append) is fit
-    assert not fitter.benches
+    assert not fitter.prepared
     done = set(richer[1:])
     with_richer_laws(search, fit, laws, done, reported.append)
-    assert fitter.benches
+    assert fitter.prepared
     assert done == set(richer)
 
 

@@ -177,8 +177,8 @@ def test_an_effect_that_only_led_out_of_a_hollow_is_dropped_again(tmp_path, ther
     """The best fit without it is far behind, and the fit as it is, without it, is not."""
     problem = planted(tmp_path, GearFriction(coulomb_Nm=0.02))
     keys, offset = ("gear-friction/coulomb", "sensor-offset/constant@torque_Nm"), 0.4 * there
-    for bench in problem.fitted:
-        bench.measured[:, bench.channels.index("torque_Nm")] += offset
+    for prepared in problem.fitted:
+        prepared.measured[:, prepared.channels.index("torque_Nm")] += offset
     fitter, laws = Fitter(problem, far=10.0), catalogue(problem.case)
     hypothesis = Hypothesis(laws=tuple(laws[key] for key in keys))
     fit = fit_at(problem, fitter, keys, problem.start(hypothesis, ((0.02,), (offset,))))

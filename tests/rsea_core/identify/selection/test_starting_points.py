@@ -45,9 +45,9 @@ def problem_of(key: str | None) -> Problem:
     blank = problem_of(None)
     hypothesis = Hypothesis(laws=(catalogue(case)[key],))
     x = blank.start(hypothesis, [TRUTH[key]])
-    bench = blank.fitted[0]
-    read = blank.predict(bench, hypothesis, x[None])[0]
-    columns |= dict(zip(bench.channels, read.T, strict=True))
+    prepared = blank.fitted[0]
+    read = blank.predict(prepared, hypothesis, x[None])[0]
+    columns |= dict(zip(prepared.channels, read.T, strict=True))
     case = Case(
         name="made", folder=Path(), rig=RIG,
         recordings=(Recording(file="made.csv", load=Load(kind="pendulum"), columns=columns,
@@ -80,9 +80,9 @@ def test_a_fit_from_the_grid_comes_to_the_machine_that_was_replayed(key):
 def test_without_a_valley_nothing_begins():
     """Readings of a machine that is as its owner says: no start is worth a fit."""
     problem = problem_of(None)
-    bench = problem.fitted[0]
-    read = problem.predict(bench, Hypothesis(), problem.start(Hypothesis())[None])[0]
-    bench.measured[:] = read
+    prepared = problem.fitted[0]
+    read = problem.predict(prepared, Hypothesis(), problem.start(Hypothesis())[None])[0]
+    prepared.measured[:] = read
     search = search_of(problem)
     assert from_grids(search, search.parameters, list(catalogue(problem.case).values())) == []
 
