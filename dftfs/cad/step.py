@@ -161,7 +161,8 @@ def check_step(
         shape = cq.Shape.cast(XCAFDoc_ShapeTool.GetShape_s(shapes.Value(1)))
         found = _labels(document, reader.StepModel(), what)
         stated = _entities(reader.StepModel())
-        check_tolerances(document, stated, width_m, labels.tolerances, what)
+        sizes = width_m, 2 * outline.parameters.bore_radius_m
+        check_tolerances(document, stated, sizes, labels.tolerances, what)
     for field in ("material", "author"):
         is_, must = getattr(found, field), getattr(labels, field)
         require(is_ == must, f"{what} has the {field} {is_!r} and must have {must!r}")

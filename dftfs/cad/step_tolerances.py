@@ -1,6 +1,7 @@
-"""Tolerances in a STEP file that programs can read (PMI after AP242): width, profile, datums.
+"""Tolerances in a STEP file that programs can read (PMI after AP242): sizes, profile, datums.
 
-Datum A is the lower face, B the bore. All other faces but the upper one are cut: they carry one
+Datum A is the lower face, B the bore. The bore is a diameter with the limits of H7: a profile to
+B would tolerance the datum to itself. All other faces but the upper one are cut: they carry one
 profile of a surface to A and B. The axial width is a distance of two faces with its limits.
 """
 
@@ -8,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import cadquery as cq
-from OCP.StepShape import StepShape_ToleranceValue
+from OCP.StepShape import StepShape_PlusMinusTolerance, StepShape_ToleranceValue
 from OCP.TCollection import TCollection_HAsciiString
 from OCP.TDF import TDF_Label, TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
@@ -22,16 +23,19 @@ from OCP.XCAFDoc import (
     XCAFDoc_GeomTolerance,
 )
 
+from dftfs.cad.fits import h7_m
 from dftfs.cad.verify import require, require_close
 from dftfs.errors import DesignError
 
 _RTOL = 1e-9
 _ACROSS = 0.9  # of a normal along z: the two end faces
+_WIDTH = DimensionType.XCAFDimTolObjects_DimensionType_Location_LinearDistance
+_DIAMETER = DimensionType.XCAFDimTolObjects_DimensionType_Size_Diameter
 
 
 @dataclass(frozen=True, kw_only=True)
 class StepTolerances:
-    """Of the axial width, either way, and the zone of the profile of all cut faces.
+    """Of the axial width, either way, and the zone of the profile of all cut faces but the bore.
 
     Raises
     ------
@@ -55,7 +59,7 @@ def add_tolerances(
     width_m: float,
     tolerances: StepTolerances,
 ) -> None:
-    """State width, profile and datums on the faces of the part, in the document's mm."""
+    """State width, bore, profile and datums on the faces of the part, in the document's mm."""
     shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
     tool = XCAFDoc_DocumentTool.DimTolTool_s(document.Main())
     faces = solid.Faces()
@@ -66,15 +70,14 @@ def add_tolerances(
     bore = min(cut, key=lambda k: (not _is_whole_cylinder(faces[k]), faces[k].Area()))
     place = tool.AddDimension()
     tool.SetDimension(_sequence(labels[lower]), _sequence(labels[upper]), place)
-    dimension = XCAFDoc_Dimension.Set_s(place)
-    distance = dimension.GetObject()
-    distance.SetType(DimensionType.XCAFDimTolObjects_DimensionType_Location_LinearDistance)
-    distance.SetValue(1e3 * width_m)
-    distance.SetLowerTolValue(-1e3 * tolerances.width_tolerance_m)
-    distance.SetUpperTolValue(1e3 * tolerances.width_tolerance_m)
-    dimension.SetObject(distance)
+    width = tolerances.width_tolerance_m
+    _state_size(place, _WIDTH, width_m, -width, width)
+    place = tool.AddDimension()
+    tool.SetDimension(labels[bore], place)
+    diameter_m = 2e-3 * next(e for e in faces[bore].Edges() if e.geomType() == "CIRCLE").radius()
+    _state_size(place, _DIAMETER, diameter_m, 0.0, h7_m(diameter_m))
     zone = tool.AddGeomTolerance()
-    tool.SetGeomTolerance(_sequence(*(labels[k] for k in cut)), zone)
+    tool.SetGeomTolerance(_sequence(*(labels[k] for k in cut if k != bore)), zone)
     tolerance = XCAFDoc_GeomTolerance.Set_s(zone)
     profile = tolerance.GetObject()
     profile.SetType(ToleranceType.XCAFDimTolObjects_GeomToleranceType_ProfileOfSurface)
@@ -84,26 +87,52 @@ def add_tolerances(
         _add_datum(tool, name, position, labels[face], zone)
 
 
+def _state_size(
+    place: TDF_Label, kind: DimensionType, size_m: float, lower_m: float, upper_m: float
+) -> None:
+    """Give a dimension its kind, its size and how far below and above it the part may lie."""
+    dimension = XCAFDoc_Dimension.Set_s(place)
+    stated = dimension.GetObject()
+    stated.SetType(kind)
+    stated.SetValue(1e3 * size_m)
+    stated.SetLowerTolValue(1e3 * lower_m)
+    stated.SetUpperTolValue(1e3 * upper_m)
+    dimension.SetObject(stated)
+
+
 def correct_limits(entities: Iterable[object]) -> None:
-    """Name both limits of a width as lengths, the lower one negative: the kernel drops both."""
-    for limits in _limits(entities):
+    """Name both limits of a size as lengths, the lower one not positive: the kernel drops both."""
+    for limits in entities:
+        if not isinstance(limits, StepShape_ToleranceValue):
+            continue
         for bound, sign in ((limits.LowerBound(), -1), (limits.UpperBound(), 1)):
-            bound.SetValueComponent(sign * abs(bound.ValueComponent()))
+            bound.SetValueComponent(sign * abs(bound.ValueComponent()) + 0.0)  # no -0
             bound.ValueComponentMember().SetName("LENGTH_MEASURE")
 
 
-def _limits(entities: Iterable[object]) -> list[StepShape_ToleranceValue]:
-    return [entity for entity in entities if isinstance(entity, StepShape_ToleranceValue)]
+def _limits(entities: Iterable[object]) -> dict[DimensionType, tuple[float, float]]:
+    """Lower and upper limit in mm of the distance and of the diameter that a file states."""
+    found = {}
+    for entity in entities:
+        if isinstance(entity, StepShape_PlusMinusTolerance):
+            value = entity.Range().ToleranceValue()
+            kind = _DIAMETER if entity.TolerancedDimension().DimensionalSize() else _WIDTH
+            found[kind] = tuple(
+                bound.ValueComponent() for bound in (value.LowerBound(), value.UpperBound())
+            )
+    return found
 
 
 def check_tolerances(
     document: TDocStd_Document,
     entities: Iterable[object],
-    width_m: float,
+    sizes_m: tuple[float, float],
     tolerances: StepTolerances | None,
     what: str,
 ) -> None:
     """Compare what a file that was read states with what it must state.
+
+    ``sizes_m`` : width and bore.
 
     Raises
     ------
@@ -116,21 +145,24 @@ def check_tolerances(
     tool.GetGeomToleranceLabels(zones)
     tool.GetDatumLabels(datums)
     found = dimensions.Length(), zones.Length(), datums.Length()
-    count = (0, 0, 0) if tolerances is None else (1, 1, 2)
-    require(
-        found == count, f"{what} states {found} and must state {count} widths, profiles, datums"
-    )
+    count = (0, 0, 0) if tolerances is None else (2, 1, 2)
+    require(found == count, f"{what} states {found} and must state {count} sizes, profiles, datums")
     if tolerances is None:
         return
-    width = XCAFDoc_Dimension.Set_s(dimensions.Value(1)).GetObject()
-    either = 1e3 * tolerances.width_tolerance_m
-    require_close(f"width_mm stated in {what}", width.GetValue(), 1e3 * width_m, _RTOL)
-    (limits,) = _limits(entities)
-    for side, bound, must in (
-        ("lower", limits.LowerBound(), -either),
-        ("upper", limits.UpperBound(), either),
-    ):
-        require_close(f"width's {side} limit in {what}", bound.ValueComponent(), must, _RTOL)
+    either, limits = tolerances.width_tolerance_m, _limits(entities)
+    must = {
+        _WIDTH: ("width", sizes_m[0], -either, either),
+        _DIAMETER: ("bore", sizes_m[1], 0.0, h7_m(sizes_m[1])),
+    }
+    for k in (1, 2):
+        found = XCAFDoc_Dimension.Set_s(dimensions.Value(k)).GetObject()
+        require(found.GetType() in must, f"{what} states a size that is neither width nor bore")
+        name, size_m, *bounds_m = must.pop(found.GetType())
+        require_close(f"{name}_mm stated in {what}", found.GetValue(), 1e3 * size_m, _RTOL)
+        for side, is_mm, bound_m in zip(("lower", "upper"), limits[found.GetType()], bounds_m):
+            # of the size: a limit of zero has no relative error
+            is_at, must_at = 1e3 * size_m + is_mm, 1e3 * (size_m + bound_m)
+            require_close(f"{name}'s {side} limit in {what}", is_at, must_at, _RTOL)
     profile = XCAFDoc_GeomTolerance.Set_s(zones.Value(1)).GetObject().GetValue()
     require_close(f"profile_mm stated in {what}", profile, 1e3 * tolerances.profile_m, _RTOL)
     names = [XCAFDoc_Datum.Set_s(datums.Value(k)).GetObject().GetName().ToCString() for k in (1, 2)]

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from dftfs.analysis.study.drawing_tolerance import DrawingTolerance
+from dftfs.cad.fits import h7_m
 from dftfs.design import SpringDesign
 from dftfs.errors import DesignError
 from dftfs.spring.outline import build_outline
@@ -59,26 +60,29 @@ def strip_row(arm: int, place: str) -> str:
 
 
 def measuring_sheet(design: SpringDesign, tolerance: DrawingTolerance) -> str:
-    """CSV of the dimensions to measure: nominal, limits, room for the finding, in mm."""
+    """CSV of the dimensions to measure: nominal, limits, room for the finding, in mm.
+
+    The bore is H7; what else is cut may lie anywhere in the zone of the profile.
+    """
     p, t = design.spiral, tolerance
-    edge = t.profile_m / 2
+    edge, bore = t.profile_m / 2, 2 * p.bore_radius_m
     rows = [
         *(
-            (strip_row(arm, place), _thickness_m(p, share), t.thickness_m)
+            (strip_row(arm, place), _thickness_m(p, share), -t.thickness_m, t.thickness_m)
             for arm in range(design.n_arms)
             for place, share in PLACES.items()
         ),
-        (_WIDTH, design.width_m, t.width_m),
-        ("bore diameter", 2 * p.bore_radius_m, 2 * edge),
-        ("rim outside diameter", 2 * p.rim_outer_radius_m, 2 * edge),
-        ("slit width at its end", 2 * p.fillet_radius_m, 2 * edge),
-        *((name, p.fillet_radius_m, edge) for name in _FILLETS),
+        (_WIDTH, design.width_m, -t.width_m, t.width_m),
+        ("bore diameter, H7", bore, 0.0, h7_m(bore)),
+        ("rim outside diameter", 2 * p.rim_outer_radius_m, -2 * edge, 2 * edge),
+        ("slit width at its end", 2 * p.fillet_radius_m, -2 * edge, 2 * edge),
+        *((name, p.fillet_radius_m, -edge, edge) for name in _FILLETS),
     ]
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for name, nominal, either in rows:
-        values = (nominal, nominal - either, nominal + either)
+    for name, nominal, lower, upper in rows:
+        values = (nominal, nominal + lower, nominal + upper)
         writer.writerow((name, *(f"{1e3 * value:.3f}" for value in values), ""))
     stiffness, share = t.stiffness_Nm_per_rad, t.stiffness_tolerance
     limits = (stiffness * (1 + sign * share) for sign in (0, -1, 1))

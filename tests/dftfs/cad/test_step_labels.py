@@ -3,6 +3,8 @@
 import re
 from dataclasses import replace
 
+import cadquery as cq
+import numpy as np
 import pytest
 from OCP.APIHeaderSection import APIHeaderSection_MakeHeader
 from OCP.STEPCAFControl import STEPCAFControl_Reader
@@ -10,7 +12,12 @@ from OCP.TCollection import TCollection_ExtendedString
 from OCP.TDF import TDF_LabelSequence
 from OCP.TDocStd import TDocStd_Document
 from OCP.XCAFApp import XCAFApp_Application
-from OCP.XCAFDoc import XCAFDoc_DimTolTool, XCAFDoc_DocumentTool, XCAFDoc_MaterialTool
+from OCP.XCAFDoc import (
+    XCAFDoc_DimTolTool,
+    XCAFDoc_DocumentTool,
+    XCAFDoc_MaterialTool,
+    XCAFDoc_ShapeTool,
+)
 
 from dftfs.cad.solid import build_solid
 from dftfs.cad.step import StepLabels, check_step, write_step
@@ -185,21 +192,25 @@ def toleranced(part, tmp_path_factory):
     return path
 
 
-def test_width_limits_profile_and_datums_are_in_the_file_as_part_21_text(toleranced):
+def test_limits_of_width_and_bore_profile_and_datums_are_in_the_file_as_part_21_text(toleranced):
     text = re.sub(r"\s*\n\s*", "", toleranced.read_text())
-    ((low, high),) = re.findall(r"TOLERANCE_VALUE\(#(\d+),#(\d+)\)", text)
-    for number, value in ((low, "-5.E-02"), (high, "5.E-02")):
-        assert (
+    limits = [
+        tuple(
             re.search(rf"#{number} = MEASURE_WITH_UNIT\(LENGTH_MEASURE\((\S+?)\),", text).group(1)
-            == value
+            for number in pair
         )
+        for pair in re.findall(r"TOLERANCE_VALUE\(#(\d+),#(\d+)\)", text)
+    ]
+    assert sorted(limits) == [("-5.E-02", "5.E-02"), ("0.", "2.1E-02")]  # H7 of 21.36 mm
     assert "POSITIVE_LENGTH_MEASURE(7.34)" in text
+    assert "POSITIVE_LENGTH_MEASURE(21.36)" in text
     assert text.count("SURFACE_PROFILE_TOLERANCE()") == 1
-    assert text.count("PLUS_MINUS_TOLERANCE(") == 1
+    assert text.count("PLUS_MINUS_TOLERANCE(") == 2
+    assert re.search(r"DIMENSIONAL_SIZE\(#\d+,'diameter'\)", text)
     assert re.findall(r"= DATUM\('','',#\d+,\.F\.,'(\w)'\)", text) == ["A", "B"]
 
 
-def test_the_kernels_reader_finds_the_profile_on_every_cut_face(part, toleranced):
+def test_the_kernels_reader_finds_the_profile_on_every_cut_face_but_the_bore(part, toleranced):
     document = TDocStd_Document(TCollection_ExtendedString("MDTV-XCAF"))
     XCAFApp_Application.GetApplication_s().InitDocument(document)
     reader = STEPCAFControl_Reader()
@@ -209,13 +220,17 @@ def test_the_kernels_reader_finds_the_profile_on_every_cut_face(part, toleranced
     zones, faces, none = (TDF_LabelSequence() for _ in range(3))
     XCAFDoc_DocumentTool.DimTolTool_s(document.Main()).GetGeomToleranceLabels(zones)
     XCAFDoc_DimTolTool.GetRefShapeLabel_s(zones.Value(1), faces, none)
-    assert faces.Length() == len(part[0].Faces()) - 2
+    assert faces.Length() == len(part[0].Faces()) - 3  # two ends, and the datum of the profile
+    bore = 2 * np.pi * 10.68 * 7.34
+    for k in range(1, faces.Length() + 1):
+        face = cq.Shape.cast(XCAFDoc_ShapeTool.GetShape_s(faces.Value(k)))
+        assert face.Area() != pytest.approx(bore, rel=1e-6)
 
 
 @pytest.mark.parametrize(
     ("must", "message"),
     [
-        (None, r"states \(1, 1, 2\) and must state \(0, 0, 0\)"),
+        (None, r"states \(2, 1, 2\) and must state \(0, 0, 0\)"),
         (replace(TOLERANCES, width_tolerance_m=6e-5), "width's lower limit"),
         (replace(TOLERANCES, profile_m=7e-5), "profile_mm stated"),
     ],
@@ -225,8 +240,21 @@ def test_the_check_refuses_other_tolerances(part, toleranced, must, message):
         check_step(toleranced, **part[1], labels=replace(LABELS, tolerances=must))
 
 
+def test_the_check_refuses_another_bore_and_its_limits(part, toleranced, tmp_path):
+    text = toleranced.read_text()
+    for old, new, message in (
+        ("(21.36)", "(21.37)", "bore_mm stated"),
+        ("(2.1E-02)", "(2.5E-02)", "bore's upper limit"),
+    ):
+        assert old in text
+        path = tmp_path / "al1.step"
+        path.write_text(text.replace(old, new))
+        with pytest.raises(CadError, match=message):
+            check_step(path, **part[1], labels=replace(LABELS, tolerances=TOLERANCES))
+
+
 def test_a_file_without_the_tolerances_asked_for_is_refused(part, written):
-    with pytest.raises(CadError, match=r"states \(0, 0, 0\) and must state \(1, 1, 2\)"):
+    with pytest.raises(CadError, match=r"states \(0, 0, 0\) and must state \(2, 1, 2\)"):
         check_step(written, **part[1], labels=replace(LABELS, tolerances=TOLERANCES))
 
 

@@ -68,6 +68,18 @@ def test_an_arm_that_is_thinner_alone_counts_once_and_the_bench_speaks_of_the_mo
     assert "arms 7.600, 7.700 mm" in capsys.readouterr().out
 
 
+def test_the_bore_is_h7_and_one_below_it_is_reported(sheet, tmp_path):
+    design, path = load_design("al1"), tmp_path / "sheet.csv"
+    (row,) = (
+        r for r in csv.DictReader(io.StringIO(sheet)) if r["characteristic"].startswith("bore")
+    )
+    assert (row["nominal_mm"], row["least_mm"], row["most_mm"]) == ("21.360", "21.360", "21.381")
+    assert not first_article(design, filled(sheet, path, bore=21.37)).outside
+    for wrong in (21.335, 21.39):
+        (line,) = first_article(design, filled(sheet, path, bore=wrong)).outside
+        assert line == f"bore diameter, H7 {wrong} is not 21.36 to 21.381"
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
