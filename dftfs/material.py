@@ -9,8 +9,8 @@ TOML schema, for each ``[materials.<name>]``: ``description``, ``family``, ``you
 ``poisson_ratio``, ``density_kg_per_m3``, ``yield_strength_MPa`` and ``ultimate_strength_MPa`` (or
 ``no_strengths = "why"``), ``creeps``; optionally ``fatigue_strength_MPa`` with ``fatigue_cycles``
 and ``fatigue_stress_ratio``, ``printed_shear_modulus_GPa``, ``anisotropic``, ``as_printed``,
-``aliases``, ``errata``, ``note``. Every number but the two fatigue conditions has its line in
-``[materials.<name>.source]``.
+``aliases``, ``alloy``, ``errata``, ``note``. Every number but the two fatigue conditions has its
+line in ``[materials.<name>.source]``.
 """
 
 import difflib
@@ -52,6 +52,8 @@ class Material:
         over maximum stress; None where the source does not state it).
     creeps, anisotropic : bool
         True for polymers: stiffness under a held load falls, and printed layers differ.
+    alloy : str
+        What to buy, where the name is not that of an alloy on the market; else empty.
     as_printed : bool
         Kept only to reproduce a publication; its moduli are not checked.
     printed_shear_modulus_Pa : float or None
@@ -81,6 +83,7 @@ class Material:
     printed_shear_modulus_Pa: float | None = None
     no_strengths: str = ""
     description: str = ""
+    alloy: str = ""
     note: str = ""
     errata: tuple[str, ...] = ()
     aliases: tuple[str, ...] = ()
@@ -276,6 +279,7 @@ _REQUIRED = (
 _STRENGTHS = ("yield_strength_MPa", "ultimate_strength_MPa")
 _OTHER_TYPES = {
     "description": str,
+    "alloy": str,
     "family": str,
     "note": str,
     "no_strengths": str,

@@ -26,7 +26,7 @@ from rsea_core.files.bounded_text import read_bounded
 COLUMNS = ("characteristic", "nominal_mm", "least_mm", "most_mm", "measured_mm")
 PLACES = {"near the hub": 0.2, "in the middle": 0.5, "near the rim": 0.85}  # of the sweep
 _WIDTH, _STIFFNESS = "axial width", "stiffness at rest, Nm/rad"
-_FILLETS = tuple(f"fillet radius {root}" for root in "ABCD")
+_FILLETS = tuple(f"fillet radius {detail}" for detail in "WXYZ")  # the drawing's details
 _MODULUS = 0.02  # two standard deviations
 _SLOPE = 3.0  # of K over the thickness, for the gauge's share
 _FAR = 0.3  # of nominal: beyond, a number is a slip of the pen or of the unit

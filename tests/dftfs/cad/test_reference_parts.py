@@ -50,6 +50,7 @@ def test_dimensions_of_the_committed_drawing_measure_the_present_design(name):
         "bore diameter": 2 * p.bore_radius_m,
         "strip thickness": p.thickness_m,
         "width": design.width_m,
+        "slit width": 2 * p.fillet_radius_m,
         **{f"{root} fillet radius": p.fillet_radius_m for root in ("notch", "foot", "slit", "tip")},
     }
     for dimension, length in lengths.items():

@@ -10,14 +10,8 @@ import pytest
 
 from dftfs.analysis.study.delivery import packed
 from dftfs.cad.drawing import write_drawing
-from dftfs.cad.drawing_sheet import (
-    SHEETS_MM,
-    BoltCircle,
-    ShopData,
-    chosen_sheet,
-    edge_break_mm,
-    notes,
-)
+from dftfs.cad.drawing_notes import edge_break_mm, notes
+from dftfs.cad.drawing_sheet import SHEETS_MM, BoltCircle, ShopData, chosen_sheet
 from dftfs.cli.main import main
 from dftfs.design import load_design
 from dftfs.errors import DesignError
