@@ -29,7 +29,8 @@ from dftfs.cad.drawing_views import dimension_front, draw_front, draw_side
 from dftfs.design import SpringDesign
 from dftfs.files import write_text
 
-_LAYERS = {"OUTLINE": (7, 50), "CENTRE": (5, 18), "DIMENSIONS": (3, 18), "SHEET": (8, 25)}
+_COLOURS = {"OUTLINE": 7, "CENTRE": 5, "DIMENSIONS": 3, "SHEET": 8}
+_FRAME_WIDTH = 25  # mm / 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +69,7 @@ def write_drawing(
     shop, sheet = shop or ShopData(), sheet or chosen_sheet(design, None, None)
     for bolt in shop.bolts:
         bolt.check(design)
-    document = _document()
+    document = _document(sheet)
     exact = shop.profile_m is not None
     pen = Pen(document, sheet, rim_m=design.spiral.rim_outer_radius_m, exact=exact)
     draw_front(pen, design, shop)
@@ -94,14 +95,16 @@ def read_measurements(path: Path) -> dict[str, float]:
     return found
 
 
-def _document() -> Drawing:
+def _document(sheet: Sheet) -> Drawing:
     document = ezdxf.new("R2010", setup=True)
     document.units = units.MM
     document.header["$MEASUREMENT"] = 1
     document.appids.add(APPLICATION)
-    for name, (colour, weight) in _LAYERS.items():
+    wide, narrow = sheet.line_widths
+    weights = {"OUTLINE": wide, "SHEET": _FRAME_WIDTH}
+    for name, colour in _COLOURS.items():
         kind = "CENTER2" if name == "CENTRE" else "CONTINUOUS"
-        document.layers.add(name, color=colour, lineweight=weight, linetype=kind)
+        document.layers.add(name, color=colour, lineweight=weights.get(name, narrow), linetype=kind)
     return document
 
 

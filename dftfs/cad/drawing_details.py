@@ -15,7 +15,7 @@ from dftfs.spring.edges import Arc, Edge
 
 LETTERS = {"notch": "W", "foot": "X", "slit": "Y", "tip": "Z"}  # fillet to detail
 _ON_ARC = np.linspace(0.2, 0.8, 13)  # of an arc: where its leader may end
-_DISTANCES = np.linspace(0.25, 0.8, 12)  # of the detail's radius, from the arc to the text
+_DISTANCES = np.linspace(0.1, 0.8, 15)  # of the detail's radius, from the arc to the text
 _ROUND = np.radians(np.arange(0, 360, 10))
 _CHORD_MM = 0.4  # of paper: an edge in a detail
 _HELD = 0.97  # of a detail's radius: what its texts keep within
@@ -124,7 +124,7 @@ def _fillet_radius(pen: Pen, detail: Detail) -> None:
 def _roomiest(pen: Pen, detail: Detail, starts: NDArray, away: NDArray, content: str) -> NDArray:
     """Where a leader from a start (n, 2) in its direction has most room for a text, in the ring.
 
-    Beyond the ring, on the middle one, if no place in it holds the text.
+    On the middle one and near it, across the ring, if no place in the ring holds the text.
     """
     ring, (width, height) = pen.sheet.detail_radius_mm, pen.size_of(content)
     knees = np.concatenate([starts + far * ring * away for far in _DISTANCES])
@@ -133,8 +133,7 @@ def _roomiest(pen: Pen, detail: Detail, starts: NDArray, away: NDArray, content:
     corners = np.abs(middles - detail.spot_mm) + np.array([width, height]) / 2
     held = np.hypot(*corners.T) <= _HELD * ring
     if not np.any(held):
-        middle = len(starts) // 2
-        return np.asarray(detail.spot_mm) + 1.15 * ring * away[middle]
+        return knees[len(starts) // 2]
     knees, middles = knees[held], middles[held]
     return knees[np.argmax(pen.clearance_mm(middles, (width, height)))]
 

@@ -1,6 +1,6 @@
 """The drawing's sheet: its size and scale, where the views stand, what a shop needs beside them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from math import sqrt
 
@@ -21,20 +21,30 @@ _DETAIL_FACTORS = (50.0, 20.0, 10.0, 5.0, 2.0, 1.0)
 # places on A3, scaled to the other sheets
 _A3_WIDTH_MM = 420.0
 _FRONT_MM, _FRONT_RADIUS_MM = (112.0, 178.0), 92.0
-_SIDE_X_MM, _SIDE_WIDTH_MM = 226.0, 24.0
-_SPOTS_MM = ((285.0, 236.0), (362.0, 236.0), (285.0, 152.0), (362.0, 152.0))
-_DETAIL_RADIUS_MM = 33.0
+# the details stand in two columns on the right of the side view; a wide one makes them smaller
+_SIDE_X_MM, _USUAL_SIDE_MM, _WIDEST_SIDE_MM = 226.0, 24.0, 84.0
+_DETAILS_END_MM, _DETAIL_ROWS_MM = 408.0, (236.0, 152.0)
+_DETAIL_RADIUS_MM, _BETWEEN_DETAILS_MM, _AFTER_SIDE_MM = 33.0, 11.0, 2.0
 _DETAIL_REACH = 0.85  # of the strip's thickness that a detail must show around its fillet
+_LEGIBLE_MM = 1.0  # of paper: a thinner strip runs into its own outlines, if a sheet helps it
+# strip's thickness on paper, from which the outline and the other lines have these widths in mm/100
+_LINE_WIDTHS = ((3.0, (50, 18)), (1.5, (35, 18)), (0.0, (25, 13)))  # ISO 128-2: about 2 to 1
 _SMALLEST_TEXT_MM = 1.8
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sheet:
-    """A sheet of a size at a scale, and where everything stands on it, in mm of paper."""
+    """A sheet of a size at a scale, and where everything stands on it, in mm of paper.
+
+    ``side_width_mm`` : of the side view as drawn; ``line_widths`` of the outline and of the other
+    lines, in mm / 100.
+    """
 
     name: str
     scale: float
     detail_scale: float
+    side_width_mm: float = 0.0
+    line_widths: tuple[int, int] = (50, 18)
 
     @property
     def size_mm(self) -> tuple[float, float]:
@@ -57,14 +67,22 @@ class Sheet:
         return self.factor * _SIDE_X_MM
 
     @property
-    def spots_mm(self) -> tuple[tuple[float, float], ...]:
-        """Centres of the four details."""
-        return tuple(self.at(spot) for spot in _SPOTS_MM)
+    def _details_left_mm(self) -> float:
+        side = max(self.side_width_mm, self.factor * _USUAL_SIDE_MM)
+        return self.side_mm + side + self.factor * _AFTER_SIDE_MM
 
     @property
     def detail_radius_mm(self) -> float:
         """Radius of a detail's circle."""
-        return self.factor * _DETAIL_RADIUS_MM
+        room = self.factor * (_DETAILS_END_MM - _BETWEEN_DETAILS_MM) - self._details_left_mm
+        return min(self.factor * _DETAIL_RADIUS_MM, room / 4)
+
+    @property
+    def spots_mm(self) -> tuple[tuple[float, float], ...]:
+        """Centres of the four details."""
+        first = self._details_left_mm + self.detail_radius_mm
+        second = first + 2 * self.detail_radius_mm + self.factor * _BETWEEN_DETAILS_MM
+        return tuple((x, self.factor * y) for y in _DETAIL_ROWS_MM for x in (first, second))
 
     @property
     def letters(self) -> float:
@@ -79,6 +97,8 @@ class Sheet:
 def chosen_sheet(design: SpringDesign, name: str | None, scale: float | None) -> Sheet:
     """The sheet and scale that are asked for, else the largest scale that fits, on A3 first.
 
+    A larger sheet is taken where it shows a strip that is thinner than a millimetre on A3 larger.
+
     Raises
     ------
     DesignError
@@ -90,24 +110,38 @@ def chosen_sheet(design: SpringDesign, name: str | None, scale: float | None) ->
     if scale is not None and scale not in STANDARD_SCALE:
         known = ", ".join(scale_text(one) for one in STANDARD_SCALE)
         raise DesignError(f"--scale {scale:g} is no standard scale; known are {known}")
+    strip, width, best = 1e3 * design.spiral.thickness_range_m[0], 1e3 * design.width_m, None
     for sheet in [name] if name else ["A3", "A4", "A2", "A1"]:
-        room = _FRONT_RADIUS_MM * SHEETS_MM[sheet][0] / _A3_WIDTH_MM
-        side = _SIDE_WIDTH_MM * SHEETS_MM[sheet][0] / _A3_WIDTH_MM
-        fits = [
-            one
-            for one in ([scale] if scale else STANDARD_SCALE)
-            if rim * one <= room and 1e3 * design.width_m * one <= side
-        ]
-        if fits:
-            reach = _DETAIL_RADIUS_MM * SHEETS_MM[sheet][0] / _A3_WIDTH_MM
-            shown = _DETAIL_REACH * 1e3 * design.spiral.thickness_m
-            details = [one for one in _DETAIL_FACTORS if one * shown <= reach]
-            return Sheet(name=sheet, scale=fits[0], detail_scale=details[0] if details else fits[0])
+        factor = SHEETS_MM[sheet][0] / _A3_WIDTH_MM
+        room, side = factor * _FRONT_RADIUS_MM, factor * _WIDEST_SIDE_MM
+        for one in [scale] if scale else STANDARD_SCALE:
+            if rim * one <= room * (1 + 1e-9) and width * one <= side:
+                if best is None or one > best[1]:
+                    best = sheet, one
+                break
+        if best is not None and strip * best[1] >= _LEGIBLE_MM * (1 - 1e-9):
+            break
+    if best is not None:
+        return _laid_out(design, *best)
     raise DesignError(
         f"{2 * rim:.4g} mm across, {1e3 * design.width_m:.4g} mm wide, does not fit at"
         f" {scale_text(scale or STANDARD_SCALE[-1])} on {name or 'any sheet up to A1'};"
         " a smaller --scale or a larger --sheet would work"
     )
+
+
+def _laid_out(design: SpringDesign, name: str, scale: float) -> Sheet:
+    """The sheet with the largest scale of its details, and lines as wide as the strip bears."""
+    p = design.spiral
+    strip = 1e3 * p.thickness_range_m[0] * scale
+    widths = next(widths for least, widths in _LINE_WIDTHS if strip >= least)
+    plain = Sheet(
+        name=name, scale=scale, detail_scale=scale, side_width_mm=1e3 * design.width_m * scale,
+        line_widths=widths,
+    )  # fmt: skip
+    shown = _DETAIL_REACH * 1e3 * p.thickness_m
+    details = [one for one in _DETAIL_FACTORS if one * shown <= plain.detail_radius_mm]
+    return replace(plain, detail_scale=details[0] if details else scale)
 
 
 def scale_text(scale: float) -> str:

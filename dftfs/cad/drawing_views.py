@@ -76,11 +76,15 @@ def _holes(pen: Pen, shop: ShopData) -> None:
     for bolt in shop.bolts:
         radius = 1e3 * sheet.scale * bolt.circle_m / 2
         pen.space.add_circle(tuple(centre), radius, dxfattribs={"layer": "CENTRE"})
+        around = np.linspace(0, 2 * np.pi, 361)
+        ring = np.column_stack([np.cos(around), np.sin(around)])
+        pen.drawn(centre + radius * ring)
         for k in range(bolt.count):
             angle = 2 * np.pi * k / bolt.count
             spot = centre + radius * np.array([np.cos(angle), np.sin(angle)])
             hole = 1e3 * sheet.scale * bolt.hole_m / 2
             pen.space.add_circle(tuple(spot), hole, dxfattribs={"layer": "OUTLINE"})
+            pen.drawn(spot + hole * ring)
 
 
 def _arcs(design: SpringDesign, name: str) -> list[Arc]:

@@ -2,17 +2,21 @@
 
 import csv
 import io
+from dataclasses import replace
 from functools import cache
+from itertools import combinations
 
 import ezdxf
 import numpy as np
 import pytest
+from ezdxf import bbox as bounding_box
+from ezdxf.tools.text_size import mtext_size
 
 from dftfs.analysis.study.drawing_tolerance import drawing_tolerance
 from dftfs.analysis.study.measuring_sheet import measuring_sheet
 from dftfs.cad.drawing import read_measurements, write_drawing
 from dftfs.cad.drawing_notes import notes, title_block
-from dftfs.cad.drawing_sheet import ShopData, chosen_sheet
+from dftfs.cad.drawing_sheet import ShopData, chosen_sheet, place
 from dftfs.design import load_design
 from dftfs.process import find_process
 
@@ -212,3 +216,58 @@ def test_the_slit_has_its_width(each):
     )
     scale = next(tag.value for tag in entity.get_xdata("DFTFS") if tag.code == 1040)
     assert entity.get_measurement() / scale == pytest.approx(2e3 * design.spiral.fillet_radius_m)
+
+
+def label_boxes(document):
+    """Name to left, lower, right, upper of every dimension's text and every single letter."""
+    space, found = document.modelspace(), {}
+    for entity in space.query("DIMENSION"):
+        (label,) = entity.get_geometry_block().query("MTEXT")
+        size, turn = mtext_size(label), np.radians(label.dxf.rotation)
+        wide = abs(size.total_width * np.cos(turn)) + abs(size.total_height * np.sin(turn))
+        high = abs(size.total_width * np.sin(turn)) + abs(size.total_height * np.cos(turn))
+        half, centre = np.array([wide, high]) / 2, np.array(label.dxf.insert.vec2)
+        found[label.text + str(len(found))] = (*(centre - half), *(centre + half))
+    for entity in space.query("TEXT"):
+        if len(entity.dxf.text) == 1 and entity.dxf.text.isalpha():
+            box = bounding_box.extents([entity])
+            found[entity.dxf.text] = (*box.extmin.vec2, *box.extmax.vec2)
+    return found
+
+
+def test_no_label_lies_on_another_or_beyond_the_frame(each):
+    _, sheet, document = each
+    found, (width, height) = label_boxes(document), sheet.size_mm
+    assert len(found) == 12 + 6
+    for name, box in found.items():
+        assert min(box[:2]) > 10, name
+        assert max(box[2] - width, box[3] - height) < -10, name
+    for (name, a), (other, b) in combinations(found.items(), 2):
+        apart = a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]
+        assert apart, f"{name} lies on {other}"
+
+
+def test_strips_and_letters_stay_legible(each):
+    design, sheet, document = each
+    wide = document.layers.get("OUTLINE").dxf.lineweight / 100
+    assert 1e3 * design.spiral.thickness_m * sheet.scale >= 4 * wide
+    edges = [edge for gap in design.outline.coil_gaps for edge in gap]
+    points = np.concatenate([edge.point(np.linspace(0, 1, 3001)) for edge in edges])
+    placed = place(points, sheet.front_mm, sheet.scale)
+    for letter, box in label_boxes(document).items():
+        if letter in ("W", "X", "Y", "Z"):
+            outside = np.maximum(np.maximum(box[:2] - placed, placed - box[2:]), 0)
+            assert np.min(np.hypot(*outside.T)) > 0.4 + wide / 2, letter
+
+
+def test_a_wide_part_keeps_its_scale_and_a_thin_strip_gets_a_sheet_that_shows_it():
+    thin = chosen_sheet(wide_and_thin(), None, None)
+    assert (thin.name, thin.scale) == ("A3", 2.0)
+    (left, y), (right, _) = thin.spots_mm[:2]
+    assert left - thin.detail_radius_mm > thin.side_mm + thin.side_width_mm
+    assert right + thin.detail_radius_mm < 410
+    assert y + thin.detail_radius_mm < 287
+    whole = load_design("al1")
+    spiral = replace(whole.spiral, thickness_m=7e-4, rim_inner_radius_m=76.2e-3)
+    chosen = chosen_sheet(replace(whole, spiral=spiral), None, None)  # 0.7 mm on A3
+    assert (chosen.name, chosen.scale, chosen.line_widths) == ("A1", 2.0, (25, 13))
