@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dftfs.analysis.strength.fkm import surface_left_by
 from dftfs.analysis.study.drawing_tolerance import drawing_tolerance
 from dftfs.analysis.study.tolerance import shifted
 from dftfs.cad.drawing import write_drawing
@@ -75,7 +76,8 @@ def main() -> None:
             part_number=f"S-{design.name}", revision="A", date="2026-11-24", author="A. B.",
             process=process.name, temper="as delivered", thickness_tolerance_m=found.thickness_m,
             width_tolerance_m=found.width_m, profile_m=found.profile_m, stiffness=found.line(),
-            bolts=holes,
+            roughness_um=surface_left_by(process.name).roughness_um,
+            taper_m=(process.taper_least_m, process.taper_most_m), bolts=holes,
         )  # fmt: skip
         made = write_drawing(design, folder, design_hash="0" * 12, shop=shop, sheet=sheet)
         kept = 100 * kept_of_2000(design, found)

@@ -14,6 +14,7 @@ from dftfs.errors import DesignError
 from rsea_core.files.toml_tables import number, parse_toml, read_toml, table, word
 
 _LIMITS = ("gap", "wall", "inside_radius", "edge_tolerance")
+_TAPER = ("taper_least", "taper_most")
 _REQUIRED = ("description", *(f"{name}_mm" for name in _LIMITS), "source")
 
 
@@ -22,7 +23,9 @@ class Process:
     """Limits of a process; each is the larger of a fixed part and a share of the part's width.
 
     ``edge_tolerance``: how far, either way, a cut edge may lie from where it was drawn (here the
-    share adds to the fixed part).
+    share adds to the fixed part). ``taper_least``, ``taper_most``: between them
+    lies how much further one end of a cut is from where it was drawn than the other, on top of
+    that; 0 where none is stated.
 
     Raises
     ------
@@ -40,6 +43,8 @@ class Process:
     wall_per_width: float = 0.0
     inside_radius_per_width: float = 0.0
     edge_tolerance_per_width: float = 0.0
+    taper_least_m: float = 0.0
+    taper_most_m: float = 0.0
     note: str = ""
     sources: tuple[tuple[str, str], ...] = ()
 
@@ -104,7 +109,8 @@ def _processes(document: dict, origin: str) -> tuple[Process, ...]:
 
 def _process(name: str, entry: dict, where: str) -> Process:
     shares = tuple(f"{limit}_per_width" for limit in _LIMITS)
-    known = (*_REQUIRED, *shares, "note")
+    lengths = tuple(f"{name}_mm" for name in (*_LIMITS, *_TAPER))
+    known = (*_REQUIRED, *shares, *lengths[-len(_TAPER) :], "note")
     table(entry, where, DesignError)
     for key in entry:
         if key not in known:
@@ -116,7 +122,7 @@ def _process(name: str, entry: dict, where: str) -> Process:
     for key in ("description", "note"):
         word(entry.get(key, ""), f"{where}: {key}", DesignError)
     values: dict[str, float] = {}
-    for key in entry.keys() & {*shares, *(f"{limit}_mm" for limit in _LIMITS)}:
+    for key in entry.keys() & {*shares, *lengths}:
         value = number(entry[key], f"{where}: {key}", DesignError)
         if not word(sources.get(key, ""), f"{where}: source of {key}", DesignError):
             raise DesignError(f"{where}: {key} has no source")

@@ -16,6 +16,8 @@ from dftfs.spring.parameters import SpiralParameters
 _GLYPH = 0.68  # width of a character over its height
 _SCALE, _SYMBOL_MM = "SCALE, SHEET", 20.0  # the row with the symbol of the projection, its width
 _DETAILS = f"{min(LETTERS.values())} to {max(LETTERS.values())}"
+# Ceratizit, Surface quality (DIN 4768): Ra 1.6 with Rz 10, 12.5 with 63: Rz is 5 to 6 times Ra
+_RZ_OVER_RA, _BORE_RA_UM = 6.0, 1.6
 _BREAKS_MM, _BREAK_COSTS = (0.2, 0.1, 0.05, 0.03, 0.02, 0.01), 0.005  # of the stiffness
 
 
@@ -111,7 +113,8 @@ def notes(design: SpringDesign, shop: ShopData) -> list[str]:
     if shop.stiffness:
         lines.append(shop.stiffness)
     lines += [
-        f"Cut edges Ra {shop.roughness_um:g}, notches {_DETAILS} free of marks across the strip.",
+        f"{_surface(shop)}; notches {_DETAILS} free of marks across the strip.",
+        *_taper(shop),
         f"Edges broken {edge_break_mm(design):g} at most (ISO 13715); no burrs.",
         f"Temper before cutting: {shop.temper or 'as the material states'}; no heat after.",
     ]
@@ -126,6 +129,27 @@ def notes(design: SpringDesign, shop: ShopData) -> list[str]:
         lines.append("No fastening holes: hub and rim are drilled with their mating parts.")
     lines.append("A bearing must hold the rim. Cut from the DXF or STEP; this sheet inspects.")
     return ["NOTES", *(f"{k}  {line}" for k, line in enumerate(lines, start=1))]
+
+
+def _surface(shop: ShopData) -> str:
+    """Roughness of the cut edges, and of the bore where the process cuts too roughly for a fit."""
+    if shop.roughness_um is None:
+        return f"Cut edges Ra {_BORE_RA_UM:g}"
+    average = shop.roughness_um / _RZ_OVER_RA
+    bore = f", bore Ra {_BORE_RA_UM:g}" if average > 1.1 * _BORE_RA_UM else ""
+    return f"Cut edges Ra {average:.2g} (Rz {shop.roughness_um:g}) at most{bore}"
+
+
+def _taper(shop: ShopData) -> list[str]:
+    """What the cut's taper is and whether the profile has room for it."""
+    least, most = (1e3 * value for value in shop.taper_m)
+    if not most:
+        return []
+    line = f"Taper of the cut through the width {least:g} to {most:g} by {shop.process},"
+    zone = shop.profile_m
+    if zone is not None and most > 1e3 * zone:
+        return [f"{line} more than the profile allows: correct it."]
+    return [f"{line} within the profile."]
 
 
 def _strip_note(p: SpiralParameters) -> str:

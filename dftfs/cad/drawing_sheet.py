@@ -192,7 +192,9 @@ class ShopData:
     """What a shop needs beyond the shape; None leaves a line of the drawing out.
 
     ``thickness_tolerance_m`` either way, ``profile_m`` the whole zone, both so that the stated
-    ``stiffness`` sentence holds (`dftfs.analysis.study.drawing_tolerance`).
+    ``stiffness`` sentence holds (`dftfs.analysis.study.drawing_tolerance`). ``roughness_um`` is
+    the Rz that the process leaves, which the life assumes; ``taper_m`` the least and the most by
+    which its cuts are wider at one end of the width, 0 where none is known.
     """
 
     part_number: str = ""
@@ -205,7 +207,8 @@ class ShopData:
     width_tolerance_m: float = 5e-5
     profile_m: float | None = None
     stiffness: str = ""
-    roughness_um: float = 1.6
+    roughness_um: float | None = None
+    taper_m: tuple[float, float] = (0.0, 0.0)
     bolts: tuple[BoltCircle, ...] = ()
 
 

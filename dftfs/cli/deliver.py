@@ -49,6 +49,7 @@ def _day(text: str) -> str:
 
 def run(arguments: argparse.Namespace) -> int:
     """Solve, draw, certify, pack; exit status 1 if a stated requirement or the yield fails."""
+    from dftfs.analysis.strength.fkm import surface_left_by
     from dftfs.analysis.study.delivery import (
         certificate,
         packed,
@@ -82,6 +83,8 @@ def run(arguments: argparse.Namespace) -> int:
         width_tolerance_m=tolerance.width_m,
         profile_m=tolerance.profile_m,
         stiffness=tolerance.line(),
+        roughness_um=surface_left_by(process.name).roughness_um,
+        taper_m=(process.taper_least_m, process.taper_most_m),
         bolts=circles,
     )
     files = part_files(design, result, tolerance, shop, sheet)

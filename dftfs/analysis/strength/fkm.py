@@ -57,6 +57,11 @@ SURFACE_OF_PROCESS = {
 }
 
 
+def surface_left_by(process_name: str) -> Surface:
+    """The surface that a process leaves on a cut edge, as cut where the process is unknown."""
+    return SURFACES[SURFACE_OF_PROCESS.get(process_name, "as-cut")]
+
+
 @dataclass(frozen=True, kw_only=True)
 class FamilyConstants:
     """FKM's constants of a family; ``notch`` (a_G, b_G in MPa) is None where it has none."""

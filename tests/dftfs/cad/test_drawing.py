@@ -12,13 +12,14 @@ import pytest
 from ezdxf import bbox as bounding_box
 from ezdxf.tools.text_size import mtext_size
 
+from dftfs.analysis.strength.fkm import SURFACE_OF_PROCESS, SURFACES, surface_left_by
 from dftfs.analysis.study.drawing_tolerance import drawing_tolerance
 from dftfs.analysis.study.measuring_sheet import measuring_sheet
 from dftfs.cad.drawing import read_measurements, write_drawing
 from dftfs.cad.drawing_notes import notes, title_block
 from dftfs.cad.drawing_sheet import ShopData, chosen_sheet, place
 from dftfs.design import load_design
-from dftfs.process import find_process
+from dftfs.process import builtin_processes, find_process
 
 pytestmark = pytest.mark.needs_cad
 
@@ -271,3 +272,29 @@ def test_a_wide_part_keeps_its_scale_and_a_thin_strip_gets_a_sheet_that_shows_it
     spiral = replace(whole.spiral, thickness_m=7e-4, rim_inner_radius_m=76.2e-3)
     chosen = chosen_sheet(replace(whole, spiral=spiral), None, None)  # 0.7 mm on A3
     assert (chosen.name, chosen.scale, chosen.line_widths) == ("A1", 2.0, (25, 13))
+
+
+@pytest.mark.parametrize("process", builtin_processes(), ids=lambda process: process.name)
+def test_the_surface_is_the_one_that_the_life_assumes(process):
+    rz = SURFACES[SURFACE_OF_PROCESS[process.name]].roughness_um
+    assert surface_left_by(process.name).roughness_um == rz
+    data = shop(roughness_um=rz, process=process.name)
+    (line,) = (line for line in notes(load_design("al1"), data) if "Cut edges" in line)
+    ra = float(line.split(" Ra ")[1].split()[0])
+    assert ra == pytest.approx(rz / 6, rel=0.05)
+    assert f"(Rz {rz:g}) at most" in line
+    assert ("bore Ra 1.6" in line) == (ra > 2)  # a fit needs more than the process leaves
+
+
+def test_the_taper_of_a_water_jet_is_compared_with_the_profile():
+    water_jet = find_process("water-jet")
+    taper = water_jet.taper_least_m, water_jet.taper_most_m
+    assert taper == (pytest.approx(8e-5), pytest.approx(2.5e-4))
+    design = load_design("al1")
+    for profile, end in (
+        (8e-5, "more than the profile allows: correct it."),
+        (3e-4, "within the profile."),
+    ):
+        text = "\n".join(notes(design, shop(taper_m=taper, process="water-jet", profile_m=profile)))
+        assert f"through the width 0.08 to 0.25 by water-jet, {end}" in text
+    assert "Taper" not in "\n".join(notes(design, shop(process="wire-edm")))
