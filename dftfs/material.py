@@ -7,7 +7,8 @@ enforces the first, so a number without a source cannot enter.
 
 TOML schema, for each ``[materials.<name>]``: ``description``, ``family``, ``youngs_modulus_GPa``,
 ``poisson_ratio``, ``density_kg_per_m3``, ``yield_strength_MPa`` and ``ultimate_strength_MPa`` (or
-``no_strengths = "why"``), ``creeps``; optionally ``fatigue_strength_MPa`` with ``fatigue_cycles``
+``no_strengths = "why"``), ``creeps``; optionally ``strength_basis`` ("typical" or "minimum"),
+``minimum_yield_strength_MPa``, ``fatigue_strength_MPa`` with ``fatigue_cycles``
 and ``fatigue_stress_ratio``, ``printed_shear_modulus_GPa``, ``anisotropic``, ``as_printed``,
 ``aliases``, ``alloy``, ``errata``, ``note``. Every number but the two fatigue conditions has its
 line in ``[materials.<name>.source]``.
@@ -52,6 +53,10 @@ class Material:
         over maximum stress; None where the source does not state it).
     creeps, anisotropic : bool
         True for polymers: stiffness under a held load falls, and printed layers differ.
+    strength_basis : str
+        ``"typical"`` of a product or its guaranteed ``"minimum"``; empty where none is stated.
+    minimum_yield_strength_Pa : float or None
+        Beside a typical strength the one that a standard guarantees; its source begins with it.
     alloy : str
         What to buy, where the name is not that of an alloy on the market; else empty.
     as_printed : bool
@@ -76,6 +81,8 @@ class Material:
     fatigue_strength_Pa: float | None = None
     fatigue_cycles: float | None = None
     fatigue_stress_ratio: float | None = None
+    strength_basis: str = ""
+    minimum_yield_strength_Pa: float | None = None
     family: str = "other"
     creeps: bool = False
     anisotropic: bool = False
@@ -104,6 +111,19 @@ class Material:
         if self.printed_shear_modulus_Pa is None:
             return None
         return self.printed_shear_modulus_Pa / self.shear_modulus_Pa - 1.0
+
+    def strength_note(self, stress_Pa: float) -> str:
+        """What the yield strength stands for, and the factor that the guaranteed one leaves."""
+        if not self.strength_basis:
+            return ""
+        least = self.minimum_yield_strength_Pa
+        if least is None:
+            return f"{self.strength_basis} strength"
+        standard = self.source("minimum_yield_strength_Pa").split(",", 1)[0]
+        return (
+            f"{self.strength_basis} strength; minimum {least / 1e6:g} MPa by {standard}: factor"
+            f" {least / stress_Pa:.4g}"
+        )
 
     def source(self, field: str) -> str:
         """Return where the number in ``field`` comes from.
@@ -243,6 +263,12 @@ def _check_strengths(material: Material) -> None:
             f"fatigue_strength {fatigue / 1e6:g} MPa must be below"
             f" ultimate_strength {ultimate / 1e6:g} MPa"
         )
+    least, basis = material.minimum_yield_strength_Pa, material.strength_basis
+    _require_finite_positive(material, "minimum_yield_strength_Pa")
+    if basis not in ("", *_BASES):
+        raise DesignError(f"strength_basis = {basis!r} must be one of {', '.join(_BASES)}")
+    if least is not None and not (basis == "typical" and least <= (yielding or least)):
+        raise DesignError("minimum_yield_strength needs a typical yield_strength that is no less")
     if (fatigue is None) != (material.fatigue_cycles is None):
         raise DesignError("fatigue_strength and fatigue_cycles belong together: give both or none")
     _require_finite_positive(material, "fatigue_cycles")
@@ -262,6 +288,7 @@ _NUMBERS = {
     "density_kg_per_m3": ("density_kg_per_m3", 1.0),
     "yield_strength_MPa": ("yield_strength_Pa", 1e6),
     "ultimate_strength_MPa": ("ultimate_strength_Pa", 1e6),
+    "minimum_yield_strength_MPa": ("minimum_yield_strength_Pa", 1e6),
     "fatigue_strength_MPa": ("fatigue_strength_Pa", 1e6),
     "printed_shear_modulus_GPa": ("printed_shear_modulus_Pa", 1e9),
     "fatigue_cycles": ("fatigue_cycles", 1.0),
@@ -276,10 +303,12 @@ _REQUIRED = (
     "density_kg_per_m3",
     "creeps",
 )
+_BASES = ("typical", "minimum")
 _STRENGTHS = ("yield_strength_MPa", "ultimate_strength_MPa")
 _OTHER_TYPES = {
     "description": str,
     "alloy": str,
+    "strength_basis": str,
     "family": str,
     "note": str,
     "no_strengths": str,

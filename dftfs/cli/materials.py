@@ -57,6 +57,8 @@ def _overview(materials: tuple[Material, ...]) -> str:
 def _sheet(material: Material) -> str:
     rows = [[p.key, f"{p.value:.6g}", p.source] for p in properties(material)]
     lines = [f"{material.name}: {material.description}", table(["value", "", "source"], rows)]
+    lines += [f"strengths: {material.strength_basis}"] if material.strength_basis else []
+    lines += [f"buy: {material.alloy}"] if material.alloy else []
     lines += [f"no strengths: {material.no_strengths}"] if material.no_strengths else []
     lines += [f"note: {material.note}"] if material.note else []
     lines += [f"errata: {', '.join(material.errata)}"] if material.errata else []

@@ -8,6 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dftfs.analysis.strength.checks import yield_check
+from dftfs.design import Requirements
 from dftfs.errors import DesignError
 from dftfs.material import Material, builtin_materials, load_materials, lookup, properties
 from dftfs.material_family import HIGHEST_OF_RANGE, LOWEST_OF_RANGE, families
@@ -393,3 +395,46 @@ def test_strengths_may_be_left_out_with_a_reason(user_file):
     (mine,) = load_materials(path)
     assert mine.yield_strength_Pa is None
     assert mine.no_strengths == "not tested"
+
+
+def test_a_yield_strength_is_typical_or_guaranteed_and_the_note_says_which():
+    for name, material in BY_NAME.items():
+        stated = material.strength_basis in ("typical", "minimum")
+        assert stated == (material.yield_strength_Pa is not None), name
+        if stated and "minimum" in material.source("yield_strength_Pa"):
+            assert material.strength_basis == "minimum", name
+    assert BY_NAME["al-6061-t6"].strength_note(200e6) == (
+        "typical strength; minimum 240 MPa by ASTM B209: factor 1.2"
+    )
+    assert BY_NAME["titanium-grade-2"].strength_note(200e6) == "minimum strength"
+    assert BY_NAME["spring-steel-1095"].strength_note(200e6) == "typical strength"
+    assert aluminium().strength_note(200e6) == ""
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"strength_basis": "mean"},
+        {"minimum_yield_strength_Pa": 240e6},
+        {"strength_basis": "minimum", "minimum_yield_strength_Pa": 240e6},
+        {"strength_basis": "typical", "minimum_yield_strength_Pa": 300e6},
+    ],
+)
+def test_a_basis_that_contradicts_the_strength_is_refused(change):
+    with pytest.raises(DesignError, match="strength"):
+        aluminium(**change)
+
+
+def test_the_yield_check_states_the_basis_and_is_judged_by_the_strength_given():
+    asked = Requirements(operating_torque_Nm=10.0, min_safety_factor_yield=1.3)
+    material = BY_NAME["al-6061-t6"]
+    (check,) = yield_check(
+        asked,
+        stress_per_torque={"winding": 20e6, "unwinding": 19e6},
+        yield_strength_Pa=material.yield_strength_Pa,
+        no_strengths="",
+        material=material,
+    )
+    assert check.passed  # 276 / 200; the minimum leaves 1.2
+    assert check.note.endswith("; typical strength; minimum 240 MPa by ASTM B209: factor 1.2")
+    assert "against 276 MPa" in check.note

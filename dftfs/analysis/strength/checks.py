@@ -7,6 +7,7 @@ module of their own.
 from dataclasses import dataclass
 
 from dftfs.design import Requirements
+from dftfs.material import Material
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,10 +89,13 @@ def yield_check(
     stress_per_torque: dict[str, float],
     yield_strength_Pa: float | None,
     no_strengths: str,
+    material: Material | None = None,
 ) -> list[Check]:
     """Safety factor to first yield at the operating torque, the worse of both directions.
 
-    ``stress_per_torque`` is the peak von Mises stress over the torque (Pa/Nm) at that torque.
+    ``stress_per_torque`` is the peak von Mises stress over the torque (Pa/Nm) at that torque. Of a
+    ``material`` the note says whether its strength is typical or guaranteed, and the factor that
+    the guaranteed one leaves; the verdict is by the strength given.
     """
     torque = requirements.operating_torque_Nm
     if torque is None:
@@ -111,6 +115,8 @@ def yield_check(
     direction = max(stress_per_torque, key=lambda key: stress_per_torque[key])
     stress = stress_per_torque[direction] * torque
     factor = yield_strength_Pa / stress
+    note = f"{stress / 1e6:.0f} MPa {direction} against {yield_strength_Pa / 1e6:.0f} MPa"
+    basis = "" if material is None else material.strength_note(stress)
     return [
         Check(
             name="safety factor to yield",
@@ -118,6 +124,6 @@ def yield_check(
             unit="",
             limit=limit,
             passed=factor >= requirements.min_safety_factor_yield,
-            note=f"{stress / 1e6:.0f} MPa {direction} against {yield_strength_Pa / 1e6:.0f} MPa",
+            note=f"{note}; {basis}" if basis else note,
         )
     ]

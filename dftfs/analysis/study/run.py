@@ -212,6 +212,7 @@ def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, .
             stress_per_torque=stress,
             yield_strength_Pa=material.yield_strength_Pa,
             no_strengths=material.no_strengths,
+            material=material,
         ),
     )
 
