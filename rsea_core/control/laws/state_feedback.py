@@ -102,21 +102,46 @@ class LqgTorque(loop.TorqueLoop):
         Ad, bd = step[:n, :n], step[:n, n]
         torque_row = linear.torque_row[states]
         L = _kalman(Ad, states, plant, self)
-        gain = regulator_gain(Ad, bd, torque_row, limit, self)
+        seen = _regulated(A, states)
+        gain = regulator_gain(
+            seen @ Ad @ np.linalg.pinv(seen),
+            seen @ bd,
+            torque_row @ np.linalg.pinv(seen),
+            limit,
+            self,
+        )
+        on_states = gain[: len(seen)] @ seen
         head = [n, self.delay_samples, 1.0 / plant.torque_per_ampere if electric else 0.0]
-        blocks = (_padded(Ad), _padded(bd), _padded(L), _padded(gain[:n]), gain[n:])
-        own = np.concatenate([head, *(np.ravel(block) for block in blocks), [float(electric)]])
+        blocks = (
+            _padded(Ad, LARGEST), _padded(bd, 1), _padded(L, 2), _padded(on_states, 1),
+            gain[len(seen) :], [float(electric)],
+        )  # fmt: skip
+        own = np.concatenate([head, *(np.ravel(block) for block in blocks)])
         return _compiled(SOURCE_VERSION), own
 
 
-def _padded(matrix: NDArray) -> NDArray:
-    """Filled up with zeros to the largest number of states in each state direction."""
-    shape = (LARGEST,) if matrix.ndim == 1 else (LARGEST, matrix.shape[1])
-    if matrix.ndim == 2 and matrix.shape[1] == matrix.shape[0]:
-        shape = (LARGEST, LARGEST)
-    found = np.zeros(shape)
-    found[tuple(slice(0, size) for size in matrix.shape)] = matrix
+def _padded(matrix: NDArray, columns: int) -> NDArray:
+    """(LARGEST, columns): filled up with zeros below and to the right."""
+    found = np.zeros((LARGEST, columns))
+    held = matrix.reshape(len(matrix), -1)
+    found[: held.shape[0], : held.shape[1]] = held
     return found
+
+
+def _regulated(A: NDArray, states: list[int]) -> NDArray:
+    """(regulated, n) matrix: what of the states the regulator returns to rest.
+
+    All of them, but for a load that nothing pulls back: the angle that wheel and load have in
+    common is then a pole at 1 that the torque never shows, so that no feedback on it is optimal.
+    """
+    every = np.eye(len(states))
+    if k.TL not in states:
+        return every
+    wheel, load = states.index(k.TW), states.index(k.TL)
+    if np.abs(A @ (every[wheel] + every[load])).max() > 1e-12 * np.abs(A).max():
+        return every
+    every[wheel, load] = -1.0  # the deflection takes the wheel's place
+    return np.delete(every, load, axis=0)
 
 
 def _kalman(Ad: NDArray, states: list[int], plant: mp.Plant, law: LqgTorque) -> NDArray:
