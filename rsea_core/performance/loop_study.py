@@ -64,7 +64,8 @@ class LoopStudy:
         Time, response and command after a step of that height at 0 s; None where it cannot run.
     margins : LoopMargins or None
     open_loop, port : ((f,), (f,)) arrays or None
-        Frequency and complex value: of the loop broken at the command; of the port [Nms/rad].
+        Frequency and complex value: of the loop broken at the command; of the port [Nms/rad], None
+        where the loop is unstable with its load held.
     predicted, bare, whole : tuple of Cycle
         Limit cycles by the describing function; of runs of the machine without its effects, and
         with them.
@@ -121,6 +122,7 @@ def loop_study(
     low = np.geomspace(SLOWEST_Hz, 0.45 / controller.sample_time_s, PORT_POINTS)
     height = STEP_SHARE * amplitude
     predicted = _predicted(known, controller, load, amplitude) if torque else ()
+    port = port_impedance(known, controller, low) if linear else None
     bare = ActuatorModel(model.rig, tuple(t for t in model.terms if t.in_spring_table))
     runs = [
         _cycles(machine, controller, load, amplitude, known, predicted) for machine in (bare, model)
@@ -132,7 +134,7 @@ def loop_study(
         step=_step(model, controller, load, height, known),
         margins=loop_margins(known, controller, load) if linear else None,
         open_loop=(f, open_loop_response(known, controller, load, f)) if linear else None,
-        port=(low, port_impedance(known, controller, low)) if linear else None,
+        port=None if port is None else (low, port),
         predicted=predicted,
         bare=runs[0],
         whole=runs[1] if len(bare.terms) < len(model.terms) else (),

@@ -162,27 +162,32 @@ def linear_tracking(
 
 def port_impedance(
     model: ActuatorModel, controller: Controller, frequencies_Hz: NDArray
-) -> NDArray:
+) -> NDArray | None:
     """What a load feels of the loop, complex (f,) [Nms/rad]: -tau_s over the load's speed.
 
     The load swings as it is made to, the reference is zero, and torque is that of the samples.
+    None for a loop that is unstable with its load held: it has no steady swing.
 
     Raises
     ------
     RseaError
         If the controller or the model cannot be used with a load whose motion is given.
     """
+    load = Load(kind="imposed")
+    if pole_radius(model, controller, load) >= 1.0:
+        return None
     found = np.empty(len(frequencies_Hz), dtype=complex)
     for j, frequency in enumerate(frequencies_Hz):
         s = 2j * np.pi * frequency
-        loop = _linear_loop(
-            model, controller, Load(kind="imposed"), 0.0, 0.0, False, load_rate_per_s=s
-        )
-        moves = np.arange(loop.b.size) != k.TL
+        loop = _linear_loop(model, controller, load, 0.0, 0.0, False, load_rate_per_s=s)
+        given = [k.TL, k.WL]  # the angle is 1; a law with ideal sensors reads its speed, too
+        moves = np.setdiff1d(np.arange(loop.b.size), given)
         closed = loop.closed
         turn = np.exp(s * controller.sample_time_s) * np.eye(loop.b.size) - closed
-        state = np.ones(loop.b.size, dtype=complex)
-        state[moves] = np.linalg.solve(turn[np.ix_(moves, moves)], closed[moves, k.TL])
+        state = np.zeros(loop.b.size, dtype=complex)
+        state[given] = 1.0, s
+        driven = closed[np.ix_(moves, given)] @ state[given]
+        state[moves] = np.linalg.solve(turn[np.ix_(moves, moves)], driven)
         found[j] = -(loop.torque @ state) / s
     return found
 

@@ -44,9 +44,23 @@ def simulated_port(controller, frequency_Hz, amplitude_rad=1e-3, periods=20):
 
 
 @pytest.mark.parametrize("frequency_Hz", [0.5, 5.0, 20.0])
-def test_the_port_impedance_is_that_of_a_run_with_the_load_swung(frequency_Hz):
-    linear = port_impedance(MODEL, PID, np.array([frequency_Hz]))[0]
-    assert abs(simulated_port(PID, frequency_Hz) - linear) < 2e-3 * abs(linear)
+@pytest.mark.parametrize(
+    "law",
+    [
+        PID,
+        replace(PID, ideal_sensors=True),
+        replace(PID, ideal_sensors=True, load_feedforward="acceleration", load_filter_s=0.01),
+    ],
+    ids=["read", "ideal", "ideal, acceleration"],
+)
+def test_the_port_impedance_is_that_of_a_run_with_the_load_swung(law, frequency_Hz):
+    linear = port_impedance(MODEL, law, np.array([frequency_Hz]))[0]
+    assert abs(simulated_port(law, frequency_Hz) - linear) < 2e-3 * abs(linear)
+
+
+def test_an_unstable_loop_has_no_port_impedance():
+    unstable = replace(PID, kp=900.0, ki=500.0, kd=20.0)
+    assert port_impedance(MODEL, unstable, np.array([1.0])) is None
 
 
 def test_a_fuzzy_loop_swings_with_the_amplitude_that_its_describing_function_states():
