@@ -97,12 +97,12 @@ def tracking_metrics(
     column = trajectory.torque_Nm if of_torque else trajectory.load_angle_rad
     t, followed, response = t[rows], trajectory.reference[rows], column[rows]
     ratio = phase = overshoot = None
-    if reference.kind == "sine":
+    height = getattr(reference, "amplitude_Nm" if of_torque else "amplitude_rad")
+    if reference.kind == "sine" and height != 0.0:
         turned = phasor(t, response, reference.frequency_Hz)
         turned = turned / phasor(t, followed, reference.frequency_Hz)
         ratio, phase = float(abs(turned)), float(np.rad2deg(np.angle(turned)))
-    if reference.kind == "step":
-        height = reference.amplitude_Nm if of_torque else reference.amplitude_rad
+    if reference.kind == "step" and height != 0.0:
         overshoot = 100.0 * max(float(np.max((response - followed[-1]) / height)), 0.0)
     error, command = followed - response, trajectory.command[rows]
     current = trajectory.current_A[rows]

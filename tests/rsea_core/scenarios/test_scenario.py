@@ -208,6 +208,16 @@ def test_closed_loop_refuses_what_cannot_be_controlled():
         run(load=Load(kind="imposed"))
 
 
+@pytest.mark.parametrize("kind", ["sine", "step"])
+def test_a_reference_without_amplitude_has_neither_ratio_nor_phase_nor_overshoot(kind):
+    still = Reference(kind=kind, amplitude_Nm=0.0, **{"sine": {"frequency_Hz": 1.0}}.get(kind, {}))
+    model = ActuatorModel(Rig.preset("rsea-bench"))
+    ran = simulate_closed_loop(model, PidTorque(), still, Load(kind="locked"), duration_s=1.0)
+    found = tracking_metrics(ran, still)
+    assert (found.amplitude_ratio, found.phase_deg, found.overshoot_percent) == (None, None, None)
+    assert found.rmse_Nm == 0.0
+
+
 def test_metrics_refuse_too_little_to_judge():
     model, sine = (
         ActuatorModel(Rig.preset("rsea-bench")),
