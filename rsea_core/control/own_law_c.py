@@ -44,6 +44,13 @@ static inline double rsea_remainder(double x, double y) {
     double r = fmod(x, y);
     return r != 0.0 && (r < 0.0) != (y < 0.0) ? r + y : r;
 }
+/* as Python's //, where x / y itself may round up */
+static inline double rsea_whole(double x, double y) {
+    double r = fmod(x, y), d = (x - r) / y, low;
+    if (r != 0.0 && (r < 0.0) != (y < 0.0)) d -= 1.0;
+    low = floor(d);
+    return d - low > 0.5 ? low + 1.0 : low;
+}
 static inline double rsea_law(const double *p, double *s, const rsea_input *y) {
     double deflection = y->motor_angle_rad / p[GEAR] - y->load_angle_rad;
     double torque = rsea_spring_torque(p + SPRING, REGIONS, deflection);"""
@@ -192,7 +199,7 @@ class _Translator:
         if isinstance(op, ast.Pow):
             return f"pow({left}, {right})"
         if isinstance(op, ast.FloorDiv):
-            return f"floor({left} / {right})"
+            return f"rsea_whole({left}, {right})"
         if isinstance(op, ast.Mod):
             return f"rsea_remainder({left}, {right})"
         raise self.refused(node)
@@ -225,7 +232,8 @@ class _Translator:
                 if not all(type(sign) in COMPARISONS for sign in signs):
                     raise self.refused(node)
                 pairs = zip(sides[:-1], signs, sides[1:], strict=True)
-                return " && ".join(f"({a} {COMPARISONS[type(o)]} {b})" for a, o, b in pairs)
+                found = [f"({a} {COMPARISONS[type(o)]} {b})" for a, o, b in pairs]
+                return found[0] if len(found) == 1 else f"({' && '.join(found)})"
         return f"({self.number(node)} != 0.0)"
 
 

@@ -233,9 +233,26 @@ def by_current(y):
 
 
 @rsea_core.controller(sample_time_s=1e-3)
+def in_bands(y):
+    if -0.5 < y.reference < 0.5 or 2.0 < y.reference <= 3.0:
+        return y.reference // 0.1 * 1e-3
+    return -0.01 * (y.reference // -0.1)
+
+
+@rsea_core.controller(sample_time_s=1e-3)
 def without_end(y):
     if y.reference > 0.0:
         return 1.0
+
+
+def test_chained_comparisons_and_whole_quotients_are_those_of_python(tmp_path):
+    """1.0 // 0.1 is 9, where floor(1.0 / 0.1) is 10; gcc warns of && inside || without brackets."""
+    rows = np.zeros((9, 5))
+    rows[:, 0] = [1.0, -1.0, 0.3, -0.3, 2.0, 2.4, 3.0, -3.7, 0.6]
+    commands = replayed(c_header(in_bands(), MODEL, Load(kind="locked")), rows, tmp_path)
+    wanted = [r // 0.1 * 1e-3 if -0.5 < r < 0.5 or 2.0 < r <= 3.0 else -0.01 * (r // -0.1)
+              for r in rows[:, 0]]  # fmt: skip
+    np.testing.assert_array_equal(commands, wanted)
 
 
 @pytest.mark.parametrize(
