@@ -80,7 +80,8 @@ class AdaptiveImpedance(Controller):
     forgetting_s : float
         Time constant with which the estimator forgets.
     pressing_Nm : float
-        Torque above which the joint counts as pressing on something.
+        Magnitude of the torque from which on the joint counts as pressing on something, on
+        either side.
 
     Raises
     ------
@@ -194,7 +195,7 @@ def _level(p, first, stiffness, rate):
 def _estimate(p, s, torque, angle):
     """Recursive least squares of the environment's stiffness, and its filtered rate."""
     moved, gained = angle - s[LAST_ANGLE], torque - s[LAST_TORQUE]
-    if torque < p[PRESSING]:
+    if abs(torque) < p[PRESSING]:
         s[LAST_ANGLE], s[LAST_TORQUE] = angle, torque
         s[K_RATE] = p[RATE_KEEP] * s[K_RATE]
         return

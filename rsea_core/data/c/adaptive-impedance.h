@@ -25,7 +25,7 @@ static inline double rsea_level(const double *rules, double stiffness, double ra
 /* recursive least squares of the environment's stiffness, and its filtered rate */
 static inline void rsea_estimate(const double *p, double *s, double torque, double angle) {
     double moved = angle - s[LAST_ANGLE], gained = torque - s[LAST_TORQUE], gain, last;
-    if (torque < p[PRESSING]) {
+    if (fabs(torque) < p[PRESSING]) {
         s[LAST_ANGLE] = angle;
         s[LAST_TORQUE] = torque;
         s[K_RATE] = p[RATE_KEEP] * s[K_RATE];

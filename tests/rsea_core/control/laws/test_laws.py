@@ -23,6 +23,7 @@ from rsea_core.control import (
 from rsea_core.control.laws.adaptive_impedance import scheduled
 from rsea_core.control.laws.fractional import chain, grunwald_letnikov, oustaloup
 from rsea_core.control.laws.signed_power import describing_function, gain_per_radian, spow
+from rsea_core.control.tuning.figures_of_merit import swung
 from rsea_core.effects import GearFriction, GearLoadFriction
 from rsea_core.errors import ControllerError
 from rsea_core.simulation.reference import AngleReference
@@ -270,6 +271,16 @@ def test_the_schedule_goes_from_soft_to_hard_with_stiffness_and_its_rate():
     assert stiff[-1] - stiff[0] > 0.4
     assert scheduled(50.0, 100.0) > scheduled(50.0, -100.0)
     assert 0.0 <= scheduled(-5.0, -1e9) < scheduled(1e9, 1e9) <= 1.0
+
+
+def test_the_adaptive_law_knows_a_contact_on_either_side():
+    """The load swung to the other side first asks for the opposite command."""
+    exact = replace(BENCH, motor_encoder_counts_per_rev=None, load_encoder_counts_per_rev=None)
+    one, other = (
+        swung(ActuatorModel(exact), AdaptiveImpedance(), side * 0.05, 1.0, 3) for side in (1, -1)
+    )
+    assert np.abs(one.command).max() > 0.02
+    np.testing.assert_allclose(one.command, -other.command, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("name", "value"), [("selection", 1.2), ("soft", (0.1, 0.2))])
