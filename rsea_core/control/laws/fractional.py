@@ -8,7 +8,9 @@ and cheap enough for a loop:
     s^mu = w_h^mu prod_k (s + w'_k) / (s + w_k),   k = 0 .. n-1
     w'_k = w_b (w_h/w_b)^((k + 1/2 - mu/2) / n),   w_k = w_b (w_h/w_b)^((k + 1/2 + mu/2) / n)
 
-each section sampled by the bilinear rule.
+each section sampled by the bilinear rule, its zero and pole prewarped (w -> 2/T tan(w T / 2)) so
+that they stay at their frequencies, and the whole scaled to be exact in the middle of the band.
+A chain is off by up to half its phase at its own ends: it begins a decade below the band.
 
 Source: Podlubny, Fractional Differential Equations (1999), section 7.3; Oustaloup, Levron,
 Mathieu & Nanot, IEEE Trans. Circuits Syst. I 47 (2000) 25; Monje et al., Fractional-order
@@ -29,6 +31,7 @@ from rsea_core.errors import ControllerError
 from rsea_core.numeric.source_version import SOURCE_VERSION
 
 SECTIONS = 9
+BELOW = 0.1  # of the lowest frequency asked for, where the chain begins
 KP, KI, KD = range(loop.N_SHARED, loop.N_SHARED + 3)
 I_CHAIN = loop.N_SHARED + 3
 D_CHAIN = I_CHAIN + 1 + 2 * SECTIONS
@@ -70,11 +73,19 @@ def oustaloup(order: float, low_rad_per_s: float, high_rad_per_s: float, section
 
 
 def chain(order: float, low: float, high: float, sample_time_s: float) -> NDArray:
-    """The sampled chain as the loop reads it: gain, then per section its zero and pole in z."""
-    gain, zeros, poles = oustaloup(order, low, high)
-    half = 0.5 * sample_time_s
-    gain *= np.prod((1.0 + half * zeros) / (1.0 + half * poles))
-    at = [(1.0 - half * w) / (1.0 + half * w) for w in (zeros, poles)]
+    """The sampled chain as the loop reads it: gain, then per section its zero and pole in z.
+
+    From `low` to 0.2 pi / T it is s^order to 3 % and 5 degrees for orders of -0.8 to 0.8; above,
+    its magnitude is too large and its phase lags: of s^0.5 by 23 % and 29 degrees at 0.8 pi / T.
+    """
+    _, zeros, poles = oustaloup(order, BELOW * low, high)
+    at = [
+        (1.0 - warped) / (1.0 + warped)
+        for warped in np.tan(0.5 * sample_time_s * np.array((zeros, poles)))
+    ]
+    middle = np.sqrt(low * high)
+    z = np.exp(1j * middle * sample_time_s)
+    gain = middle**order / np.abs(np.prod((z - at[0]) / (z - at[1])))
     return np.concatenate(([gain], np.column_stack(at).ravel()))
 
 
@@ -101,7 +112,8 @@ class FractionalPidTorque(loop.TorqueLoop):
         lambda and mu, above 0 and below 1. The integral is s^(1 - lambda) / s, so that a
         constant error still ends.
     band_low_rad_per_s : float
-        Lowest frequency at which the operators hold; the highest is 80 % of Nyquist's.
+        Lowest frequency at which the operators hold; they do up to a tenth of the sampling rate
+        (`chain`), and the chain of sections ends at 80 % of Nyquist's.
 
     The others, and what is raised, are those of `torque_loop.TorqueLoop`.
     """

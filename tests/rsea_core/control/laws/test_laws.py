@@ -149,13 +149,29 @@ def test_oustaloup_sections_have_the_gain_and_phase_of_the_power_of_s(order):
     assert np.degrees(np.abs(np.angle(response / s**order))).max() < 3.0
 
 
-def test_the_sampled_chain_has_the_response_of_the_sections():
-    T, order = 1e-3, 0.5
-    numbers = chain(order, 0.1, 0.8 * math.pi / T, T)
-    w = np.geomspace(1.0, 60.0, 7)
+@pytest.mark.parametrize("order", [-0.8, -0.5, 0.2, 0.5, 0.8])
+@pytest.mark.parametrize("low", [0.1, 1.0, 10.0])
+def test_the_sampled_chain_is_the_power_of_s_within_its_stated_band(order, low):
+    """From the lowest frequency asked for to a tenth of the sampling rate: 3 % and 5 degrees."""
+    T = 1e-3
+    w = np.geomspace(low, 0.2 * math.pi / T, 60)
+    error = sampled(order, low, w, T) / (1j * w) ** order
+    assert np.abs(np.abs(error) - 1.0).max() < 0.03
+    assert np.degrees(np.abs(np.angle(error))).max() < 5.0
+
+
+def test_beyond_its_band_the_sampled_chain_is_as_wrong_as_it_says():
+    T = 1e-3
+    w = np.array([0.8 * math.pi / T])
+    error = sampled(0.5, 0.1, w, T) / (1j * w) ** 0.5
+    assert np.abs(error[0]) == pytest.approx(1.23, abs=0.01)
+    assert np.degrees(np.angle(error[0])) == pytest.approx(-29.0, abs=0.5)
+
+
+def sampled(order, low, w, T):
+    numbers = chain(order, low, 0.8 * math.pi / T, T)
     z = np.exp(1j * w * T)[:, None]
-    response = numbers[0] * np.prod((z - numbers[1::2]) / (z - numbers[2::2]), axis=1)
-    assert np.abs(np.abs(response / (1j * w) ** order) - 1.0).max() < 0.05
+    return numbers[0] * np.prod((z - numbers[1::2]) / (z - numbers[2::2]), axis=1)
 
 
 FRICTION = (GearFriction(coulomb_Nm=0.005), WORM)
