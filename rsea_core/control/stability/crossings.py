@@ -102,11 +102,12 @@ def crossings(response: Response, sample_time_s: float, poles: NDArray) -> Cross
     ]
     if L[-1].real < 0.0:  # at half the sampling rate the loop is real
         gain_Hz.append(f[-1])
-    phase_Hz = [
-        g
-        for g in _roots(f, np.log(np.abs(L)), lambda x: np.log(abs(at(x))))
-        if abs(abs(at(g)) - 1.0) < NOT_A_CROSSING
-    ]
+    with np.errstate(divide="ignore"):  # a loop that is 0 crosses nothing
+        phase_Hz = [
+            g
+            for g in _roots(f, np.log(np.abs(L)), lambda x: np.log(abs(at(x))))
+            if abs(abs(at(g)) - 1.0) < NOT_A_CROSSING
+        ]
     nearest = int(np.abs(1.0 + L).argmin())
     ends = f[max(nearest - 1, 0)], f[min(nearest + 1, f.size - 1)]
     refined = minimize_scalar(

@@ -40,6 +40,8 @@ class AmplitudeMargins:
         inf where there is no crossing.
     gain_margin_Hz, crossover_Hz : float
         NaN where there is no crossing.
+    modulus_margin : float
+        Smallest distance of the loop from -1.
     """
 
     amplitude: float
@@ -47,6 +49,7 @@ class AmplitudeMargins:
     gain_margin_Hz: float
     phase_margin_deg: float
     crossover_Hz: float
+    modulus_margin: float
 
 
 @functools.cache
@@ -141,6 +144,7 @@ def amplitude_margins(
         gain_margin_Hz=at_gain,
         phase_margin_deg=phase,
         crossover_Hz=at_phase,
+        modulus_margin=float(np.abs(1.0 + loop).min()),
     )
 
 

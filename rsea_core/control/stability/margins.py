@@ -27,6 +27,7 @@ from rsea_core.model.actuator_model import ActuatorModel
 
 STABLE_RADIUS = 1.0 + 1e-6  # a free joint's own drift is a pole at 1
 CONSTANT = 1e-8  # a state whose row is this near to the identity's does not move
+DRIFT_per_s = 0.1  # a slower mode is a free joint's drift, whose double pole is found to 1e-4
 DIFFERENCE = 1e-6
 
 
@@ -127,6 +128,27 @@ def pole_radius(model: ActuatorModel, controller: Controller, load: Load) -> flo
         If the controller or the model cannot be used with this load.
     """
     return _linear_loop(model, controller, load, 0.0, 0.0, False).radius
+
+
+def slowest_swing_Hz(model: ActuatorModel, controller: Controller, load: Load) -> float:
+    """Lowest frequency at which the machine or the loop around it swings, inf: neither does.
+
+    A mode swings if its damping ratio is below 0.7. A loop without a gain at rest has no modes,
+    and of it the machine's alone count.
+
+    Raises
+    ------
+    RseaError
+        If the controller or the model cannot be used with this load.
+    """
+    command_name = controller.compile(model, load).command_name
+    rates = np.linalg.eigvals(linearise(model, command_name=command_name, load=load).A)
+    if controller.has_gain_at_rest:
+        poles = _linear_loop(model, controller, load, 0.0, 0.0, False).poles
+        poles = poles[np.isfinite(poles) & (np.abs(poles) > CONSTANT)].astype(complex)
+        rates = np.concatenate((rates, np.log(poles) / controller.sample_time_s))
+    swings = rates[np.abs(rates.imag) > np.maximum(np.abs(rates.real), DRIFT_per_s)].imag
+    return float(np.abs(swings).min(initial=np.inf)) / (2.0 * np.pi)
 
 
 def open_loop_response(
@@ -254,13 +276,18 @@ class _Loop:
         return self.A + np.outer(self.b, self.c)
 
     @property
-    def radius(self) -> float:
-        """Largest magnitude of the closed loop's poles; states that never move left out."""
+    def poles(self) -> NDArray:
+        """Of the closed loop, in z; states that never move left out, inf where it has none."""
         closed = self.closed
         if not np.isfinite(closed).all():
-            return np.inf
+            return np.array([np.inf])
         moving = ~np.all(np.abs(closed - np.eye(self.b.size)) < CONSTANT, axis=1)
-        return float(np.abs(np.linalg.eigvals(closed[np.ix_(moving, moving)])).max())
+        return np.linalg.eigvals(closed[np.ix_(moving, moving)])
+
+    @property
+    def radius(self) -> float:
+        """Largest magnitude of the poles."""
+        return float(np.abs(self.poles).max())
 
     def response(self, frequencies_Hz: NDArray, sample_time_s: float) -> NDArray:
         """The loop broken at the command, complex (f,)."""

@@ -1,4 +1,4 @@
-"""Whether a signal about a reference at rest swings on: not at all, steadily, or ever more."""
+"""Whether a signal about a reference at rest comes to rest, swings on, or runs away."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -10,6 +10,8 @@ SETTLED = 0.5  # of the record: what happens before is the transient
 PERIODS = 4
 LASTING = 0.7  # of its first amplitude: a swing that keeps more is not dying out
 GROWING = 1.15
+DYING = 0.9  # of what moved a fifth of the record before: it is coming to rest
+REST = 0.2  # of the record: its last parts, of which each is that long
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,3 +69,44 @@ def oscillation(time_s: NDArray, signal: NDArray, *, smallest: float) -> Oscilla
         frequency_Hz=float(sizes.size / (t[rising[-1]] - t[rising[0]])),
         growth=last / first,
     )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Unrest:
+    """What still moves at the end of a record.
+
+    Attributes
+    ----------
+    moved : float
+        Peak to peak of the last fifth, or what its mean is off that of the fifth before.
+    is_dying : bool
+        It is clearly less than a fifth earlier: a longer record may find it at rest.
+    """
+
+    moved: float
+    is_dying: bool
+
+
+def unrest(time_s: NDArray, signal: NDArray, *, smallest: float, still: float) -> Unrest | None:
+    """What of a signal does not come to rest; None: nothing of it.
+
+    Parameters
+    ----------
+    smallest : float
+        Below it no growth from fifth to fifth is seen.
+    still : float
+        What a signal at rest may move by in the last fifth, and from the fifth before.
+    """
+    last = [1.0 - REST * j for j in (3, 2, 1, 0)]
+    edges = time_s[0] + np.array(last) * (time_s[-1] - time_s[0])
+    parts = [signal[(time_s >= a) & (time_s <= b)] for a, b in pairwise(edges)]
+    if not all(np.isfinite(part).all() for part in parts):
+        return Unrest(moved=np.inf, is_dying=False)
+    sizes = [float(np.ptp(part)) for part in parts]
+    drifts = [abs(float(b.mean() - a.mean())) for a, b in pairwise(parts)]
+    grows = sizes[2] > max(smallest, GROWING * sizes[1]) and sizes[1] > GROWING * sizes[0]
+    moved = max(sizes[2], drifts[1])
+    if moved <= still and not grows:
+        return None
+    dying = not grows and moved < DYING * max(sizes[1], drifts[0])
+    return Unrest(moved=moved, is_dying=dying)
