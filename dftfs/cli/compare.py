@@ -83,6 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
         "pareto_front": pareto_front(verdicts),
         "order": order_probabilities(verdicts),
         "controllers": {v.name: tuned_values(v) for v in verdicts},
+        "moved": comparison.moved,
     }
     if files:
         source = built_in().get(arguments.comparison, Path(arguments.comparison))

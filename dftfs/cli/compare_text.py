@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from dftfs.cli.common import table
+from dftfs.report.control.comparison_tables import moved_text
 from rsea_core.control.tuning.comparison import (
     Comparison,
     Verdict,
@@ -40,6 +41,10 @@ def comparison_text(
         f" {len(ranked)} of {len(verdicts)} ranked by the mean over {comparison.perturbed} random"
         " machines"
     ]
+    if comparison.perturbed:
+        lines.append(
+            f"random machines differ in (standard deviations) {moved_text(comparison.moved)}"
+        )
     if rows:
         lines.append(table(["controller", *COLUMNS.values()], rows))
     for pair in order_probabilities(verdicts):

@@ -75,9 +75,10 @@ def _comparison() -> dict:
                    better=TEXT, worse=TEXT, probability=NUMBER,
                    difference=list_of(_REAL))  # fmt: skip
     row = {"type": "object", "required": ["controller", "kind", "rmse", "ranked"]}
-    keys = ("name", "rows", "pareto_front", "order", "controllers")
+    keys = ("name", "rows", "pareto_front", "order", "controllers", "moved")
     return closed(keys, keys, name=TEXT, rows=list_of(row), pareto_front=list_of(TEXT),
-                  order=list_of(order), controllers=table_of({"type": "object"}))  # fmt: skip
+                  order=list_of(order), controllers=table_of({"type": "object"}),
+                  moved=table_of({}))  # fmt: skip
 
 
 def _size() -> dict:

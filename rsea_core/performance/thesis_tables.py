@@ -22,7 +22,6 @@ from rsea_core.control.laws.impedance import HybridImpedance
 from rsea_core.control.laws.pid import PidTorque
 from rsea_core.control.stability.describing_functions import amplitude_margins
 from rsea_core.control.stability.margins import loop_margins
-from rsea_core.control.tuning.figures_of_merit import step_response
 from rsea_core.control.tuning.optimisers import CHI
 from rsea_core.engines.linear.linearise import linearise
 from rsea_core.machine.inputs import Load
@@ -37,6 +36,7 @@ from rsea_core.performance.thesis_arithmetic import (
 )
 from rsea_core.performance.thesis_row import MEASURED, ORDER, REPRODUCED, ThesisRow, row
 from rsea_core.simulation.reference import AngleReference
+from rsea_core.simulation.step_response import step_shape
 
 ENVIRONMENTS = {"soft": 10.0, "medium": 25.0, "hard": 50.0}  # Nm/rad, ours: the thesis says <= 50
 EXPONENTS = {  # Table 4.5: alpha, beta, gamma, delta
@@ -234,8 +234,9 @@ def _settling() -> list[ThesisRow]:
         wanted = (math.degrees(0.5 * height), 0.5 * 20.0)  # S = 0.5 of both references
         signals = (np.degrees(ran.load_angle_rad), law.force_per_torque_per_m * ran.torque_Nm)
         for times, signal, asked in zip(found.values(), signals, wanted, strict=True):
-            own = step_response(ran.time_s, signal)
-            times.append((own.overshoot_percent, own.settling_s, abs(own.final - asked)))
+            own = step_shape(ran.time_s, signal, followed=asked)
+            settling = math.nan if own.settling_to_final_s is None else own.settling_to_final_s
+            times.append((own.overshoot_percent, settling, abs(own.final - asked)))
     return [row for what, figures in found.items() for row in _settled(what, figures)]
 
 

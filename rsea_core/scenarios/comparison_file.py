@@ -7,7 +7,7 @@ from pathlib import Path
 from rsea_core.control import Controller
 from rsea_core.control.tuning.comparison import ComparedController, Comparison
 from rsea_core.control.tuning.optimisers import DEFAULT, METHODS
-from rsea_core.control.tuning.robustness import Deviation, Disturbance, perturbed_models
+from rsea_core.control.tuning.robustness import Disturbance
 from rsea_core.control.tuning.tune import Task
 from rsea_core.effects.registry import SpringCurve
 from rsea_core.errors import RseaError, ScenarioError
@@ -22,6 +22,7 @@ from rsea_core.files.toml_tables import (
 )
 from rsea_core.machine.inputs import Load
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.perturbed import Deviation, perturbed_models
 from rsea_core.model.posterior import read_posterior
 from rsea_core.scenarios.scenario import (
     controller_from_table,

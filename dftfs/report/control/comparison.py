@@ -9,6 +9,7 @@ import numpy as np
 from dftfs.report.control.comparison_tables import (
     disturbed_table,
     figures_table,
+    moved_text,
     reasons_table,
     values_table,
 )
@@ -262,11 +263,13 @@ def _sentence(comparison, verdicts: Sequence) -> str:
 
 def _tuning_sentence(comparison, tuned: Sequence) -> str:
     failed = ", ".join(f"{v.name} {v.starts.failed_share:.0%}" for v in tuned)
+    ranked = ", ".join(f"{v.name} {v.seeds_ranked}" for v in tuned)
     return (
         f"{comparison.method}, {len(comparison.seeds)} seeds, {comparison.population} runs a"
         f" generation, {comparison.generations} generations: {tuned[0].starts.evaluations}"
         " evaluations for each controller, bounds grown on the way. Seeds that ended"
-        f" beyond twice the lowest cost: {failed}."
+        f" beyond twice the lowest cost: {failed}. Seeds with a point that may be ranked, whose"
+        f" mean is the expected RMSE: {ranked}."
     )
 
 
@@ -297,8 +300,20 @@ def _conditions(comparison) -> list[str]:
         f"Cost {task.cost}, {task.duration_s:g} s judged from {task.from_s:g} s; noise while tuning"
         f" {motor:g} rad (motor), {load:g} rad (load), {current:g} A; the rig's encoders.",
         f"{comparison.perturbed} random machines, each with its own noise; controllers stay"
-        " designed for the nominal one.",
+        " designed for the nominal one. They differ in (standard deviations)"
+        f" {moved_text(comparison.moved)}.",
+        *_about_distance(task.least_modulus_margin),
         *_about_disturbances(comparison),
+    ]
+
+
+def _about_distance(least: float) -> list[str]:
+    if least == 0.0:
+        return []
+    return [
+        f"Every loop must keep a distance of {least:g} from -1: linear loops and fuzzy tables at"
+        " rest, fuzzy tables by their describing function, too, from three counts of the encoder"
+        " that moves up to the task's amplitude."
     ]
 
 

@@ -1,6 +1,6 @@
 """Tables of a comparison: figures, remarks, disturbances, values of the controllers."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from dftfs.report.study.tables import Table
 
@@ -24,6 +24,15 @@ SHOWN = {
     "wrong_compensator_rmse": "RMSE, compensator 30 % wrong",
     "wrong_compensator_percent": "increase (%)",
 }
+
+
+def moved_text(tolerances: Mapping) -> str:
+    """What differs from random machine to random machine: standard deviations, relative or not."""
+    shown = [
+        f"{key} {100.0 * spread:.3g} %" if isinstance(spread, float) else f"{key} {spread.size:.3g}"
+        for key, spread in tolerances.items()
+    ]
+    return ", ".join(shown) or "nothing"
 
 
 def figures_table(comparison, verdicts: Sequence) -> Table:

@@ -11,7 +11,8 @@ of what was searched (`standing`, `grown_bounds`); the others are listed with th
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -26,19 +27,18 @@ from rsea_core.control.tuning.bootstrap import Paired, paired, pareto
 from rsea_core.control.tuning.grown_bounds import AtBound
 from rsea_core.control.tuning.optimisers import DEFAULT, Starts
 from rsea_core.control.tuning.robustness import (
-    PERTURBED,
     Disturbance,
     Robustness,
-    Tolerances,
     agreeing_engine,
     monte_carlo,
-    perturbed_models,
     robustness,
 )
 from rsea_core.control.tuning.search_record import Search
 from rsea_core.control.tuning.standing import Standing, smallest_swing, standing
-from rsea_core.control.tuning.tune import FOLLOWED, Task, Tuned, tune, with_values
+from rsea_core.control.tuning.tune import FOLLOWED, Task, Tuned, tune
 from rsea_core.errors import ControllerError, InputError, SimulationError
+from rsea_core.model.perturbed import Tolerances, perturbed_models, usual_tolerances
+from rsea_core.simulation.step_response import StepShape, step_of
 from rsea_core.simulation.trajectory import Trajectory
 
 SLOWEST_Hz, PLOTTED = 0.1, 400  # of the loop that a page draws
@@ -79,8 +79,9 @@ class Comparison:
         On the load, where it is not held.
     notes : tuple of str
         What of a diagnosed rig's file the plant goes without, a sentence each.
-    tolerances : mapping
-        Standard deviations of the perturbed machines, see `perturbed_models`.
+    tolerances : mapping or None
+        Standard deviations of the perturbed machines, see `perturbed_models`; None: the usual ones
+        of the task's machine, which `moved` states.
 
     Raises
     ------
@@ -98,7 +99,7 @@ class Comparison:
     perturbed: int = 20
     disturbances: tuple[Disturbance, ...] = ()
     notes: tuple[str, ...] = ()
-    tolerances: Tolerances = field(default_factory=lambda: dict(PERTURBED))
+    tolerances: Tolerances | None = None
 
     def __post_init__(self):
         names = [compared.name for compared in self.controllers]
@@ -107,6 +108,11 @@ class Comparison:
         for name in names:
             if names.count(name) > 1:
                 raise InputError(f"two controllers are called {name!r}")
+
+    @property
+    def moved(self) -> Tolerances:
+        """What the perturbed machines differ in, and by how much."""
+        return usual_tolerances(self.task.model) if self.tolerances is None else self.tolerances
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,8 +129,8 @@ class Verdict:
     trajectory : Trajectory
         On the first load.
     following : merit.Following
-    step : merit.Step or None
-        For a step reference.
+    step : StepShape or None
+        For a step reference, from the step on.
     command_rms, command_change : float
         RMS, and mean absolute change from sample to sample.
     margins : LoopMargins or None
@@ -142,7 +148,9 @@ class Verdict:
     open_loop : ((f,), (f,)) arrays or None
         Frequencies [Hz] and the linear loop broken at the command, where there is one.
     by_seed : (seeds, machines) array
-        RMSE of the best point of each tuning seed on the perturbed machines.
+        RMSE on the perturbed machines of what each seed would have delivered (`Tuned.by_seed`).
+    seeds_ranked : int or None
+        Number of tuning seeds that found a point that may be ranked; None where nothing was tuned.
     """
 
     name: str
@@ -150,7 +158,7 @@ class Verdict:
     starts: Starts | None
     trajectory: Trajectory
     following: merit.Following
-    step: merit.Step | None
+    step: StepShape | None
     command_rms: float
     command_change: float
     margins: LoopMargins | None
@@ -162,6 +170,7 @@ class Verdict:
     limited_share: float
     open_loop: tuple[NDArray, NDArray] | None
     by_seed: NDArray
+    seeds_ranked: int | None
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -225,6 +234,7 @@ class Verdict:
             "tuned_cost_best": None if starts is None else starts.best.cost,
             "tuned_cost_median": None if starts is None else starts.median,
             "seeds_failed_share": None if starts is None else starts.failed_share,
+            "seeds_ranked": self.seeds_ranked,
             **{f"{d.name}: rmse": d.rmse for d in r.disturbed},
             **{f"{d.name}: peak": d.peak_deviation for d in r.disturbed},
             **{f"{d.name}: recovery_s": d.recovery_s for d in r.disturbed},
@@ -272,9 +282,7 @@ def compare(
                 population=comparison.population,
                 generations=comparison.generations,
                 done=mine,
-                on_search=None
-                if on_search is None
-                else lambda s, name=compared.name: on_search(name, s),
+                on_search=on_search and partial(on_search, compared.name),
             )
         verdicts.append(_judge(comparison, compared, tuned))
     return verdicts
@@ -302,7 +310,6 @@ def _judge(comparison: Comparison, compared: ComparedController, tuned: Tuned | 
     command = ran.command[rows]
     every = max(round(controller.sample_time_s / (time[1] - time[0])), 1)
     at_rest = task.reference.kind in ("step", "ramp")
-    step = merit.step_response(time, response) if task.reference.kind == "step" else None
     least = smallest_swing(task, float(np.abs(wanted).max()))
     swing = oscillation(time, response, smallest=least) if at_rest else None
     found = standing(task, controller) if tuned is None else tuned.standing
@@ -312,7 +319,7 @@ def _judge(comparison: Comparison, compared: ComparedController, tuned: Tuned | 
         starts=None if tuned is None else tuned.starts,
         trajectory=ran,
         following=merit.following(time, wanted, response),
-        step=step,
+        step=_step(ran, task),
         command_rms=float(np.sqrt((command**2).mean())),
         command_change=float(np.abs(np.diff(command[::every])).mean()),
         margins=found.margins,
@@ -323,7 +330,7 @@ def _judge(comparison: Comparison, compared: ComparedController, tuned: Tuned | 
             machines=comparison.perturbed,
             seed=comparison.seeds[0],
             disturbances=comparison.disturbances,
-            tolerances=comparison.tolerances,
+            tolerances=comparison.moved,
         ),
         standing=found,
         at_bounds=() if tuned is None else tuned.at_bounds,
@@ -331,6 +338,7 @@ def _judge(comparison: Comparison, compared: ComparedController, tuned: Tuned | 
         limited_share=float(ran.command_limited[rows].mean()),
         open_loop=None if found.margins is None else _open_loop(task, controller),
         by_seed=_by_seed(comparison, compared, tuned),
+        seeds_ranked=None if tuned is None else len(tuned.by_seed),
     )
 
 
@@ -339,17 +347,20 @@ def _open_loop(task: Task, controller: Controller) -> tuple[NDArray, NDArray]:
     return f, open_loop_response(task.known_model or task.model, controller, task.loads[0], f)
 
 
+def _step(ran: Trajectory, task: Task) -> StepShape | None:
+    """None without a step, or with too few rows behind it."""
+    try:
+        return step_of(ran, task.reference) if task.reference.kind == "step" else None
+    except InputError:
+        return None
+
+
 def _by_seed(comparison: Comparison, compared: ComparedController, tuned: Tuned | None) -> NDArray:
     """(seeds, machines) RMSE on the perturbed machines; one row for what is not tuned."""
     task = comparison.task
-    models = perturbed_models(
-        task.model, comparison.perturbed, comparison.seeds[0], comparison.tolerances
-    )
-    made = [compared.controller]
-    if tuned is not None:
-        points = [with_values(compared.controller, tuple(compared.bounds), s.best)
-                  for s in tuned.starts.searches]  # fmt: skip
-        made = [p for p in points if p is not None] or [tuned.controller]
+    drawn = comparison.perturbed, comparison.seeds[0], comparison.moved
+    models = perturbed_models(task.model, *drawn)
+    made = [compared.controller] if tuned is None else tuned.by_seed or [tuned.controller]
     return np.array([monte_carlo(agreeing_engine(task, c), c, models) for c in made])
 
 

@@ -1,9 +1,8 @@
-"""Figures that judge a closed loop: errors, steps, effort, energy at the port, limit cycles.
+"""Figures that judge a closed loop: errors, effort, energy at the port, limit cycles.
 
 Definitions (the thesis' section 4 with the ambiguities settled): RMSE over the judged rows;
-overshoot as the largest excursion beyond the final value, of the step's height; settling into
-2 % of the final value; steady-state error as the mean error over the last 20 %; controller
-effect as RMS of the command, effort as mean absolute change of it from sample to sample.
+steady-state error as the mean error over the last 20 %; controller effect as RMS of the command,
+effort as mean absolute change of it from sample to sample. Steps: `simulation/step_response.py`.
 """
 
 from dataclasses import dataclass
@@ -20,7 +19,6 @@ from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.simulation.simulate import run_sampled
 from rsea_core.simulation.trajectory import Trajectory
 
-SETTLING_BAND = 0.02
 LAST_SHARE = 0.2
 CYCLES_NEEDED = 3
 
@@ -67,48 +65,6 @@ def following(time_s: NDArray, reference: NDArray, response: NDArray) -> Followi
         iae=float(np.trapezoid(size, t)),
         itae=float(np.trapezoid(t * size, t)),
         itse=float(np.trapezoid(t * square, t)),
-    )
-
-
-@dataclass(frozen=True, kw_only=True)
-class Step:
-    """How a response to a step settles at its own final value.
-
-    Attributes
-    ----------
-    final : float
-        Mean of the last 20 %.
-    overshoot_percent : float
-    settling_s : float
-        Until it stays within 2 % of the way to the final value.
-    """
-
-    final: float
-    overshoot_percent: float
-    settling_s: float
-
-
-def step_response(time_s: NDArray, response: NDArray) -> Step:
-    """Judge a response to a step at the first row.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than 20 rows, or it ends where it began.
-    """
-    if time_s.size < 20:
-        raise InputError(f"{time_s.size} rows are too few to judge a step, needs 20")
-    t = time_s - time_s[0]
-    final = float(response[t >= (1.0 - LAST_SHARE) * t[-1]].mean())
-    change = final - response[0]
-    if change == 0.0:
-        raise InputError("the response ends where it began: there is no step to judge")
-    share = (response - response[0]) / change
-    outside = np.flatnonzero(np.abs(share - 1.0) > SETTLING_BAND)
-    return Step(
-        final=final,
-        overshoot_percent=float(max(share.max() - 1.0, 0.0) * 100.0),
-        settling_s=float(t[outside[-1]]) if outside.size else 0.0,
     )
 
 

@@ -6,7 +6,7 @@ machine that is known: random machines, each with noise of its own; a friction c
 wrong by 30 % on either side; pulses and ramps of an external torque on the load.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,41 +14,17 @@ from numpy.typing import NDArray
 
 from rsea_core.control.laws.base import Controller
 from rsea_core.control.tuning.tune_task import FOLLOWED, Task, precise_run, run_all
-from rsea_core.effects.registry import LoadDisturbance, Term
+from rsea_core.effects.registry import LoadDisturbance
 from rsea_core.engines.fixed_step.layout import CHANNELS
 from rsea_core.errors import InputError, RseaError, SimulationError
-from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.model.perturbed import Tolerances, perturbed_models
 from rsea_core.simulation.trajectory import PIECEWISE_LINEAR, Trajectory
 
 WRONG = (0.7, 1.3)  # shares of the friction that a compensator wrong by 30 % takes out
 NOISE_SEEDS = 5  # runs that an RMSE under noise is the mean of
 AGREEING_percent = 5.0
 RECOVERED = 0.05  # of the largest deviation
-MOST_DRAWS = 100  # of one value, until the machine takes it
-K_T, K_E = "torque_constant_Nm_per_A", "back_emf_constant_Vs_per_rad"
-PERTURBED = {
-    "torque_constant_Nm_per_A": 0.05,
-    "terminal_resistance_ohm": 0.10,
-    "motor_inertia_kgm2": 0.10,
-    "motor_viscous_Nms_per_rad": 0.50,
-}
-"""Relative standard deviations of the perturbed machines; k_e moves with k_t.
-
-The spring is left as it is: torque is read through it, so that a wrong stiffness is a scale of the
-sensor, the same for every controller.
-"""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Deviation:
-    """A standard deviation in a quantity's own unit, where others are relative."""
-
-    size: float
-
-
-Tolerances = Mapping[str, float | Deviation]
-"""Of each quantity: a field of the rig, or "effect.parameter" of a term."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,7 +141,7 @@ def robustness(
     machines: int,
     seed: int,
     disturbances: Sequence[Disturbance] = (),
-    tolerances: Tolerances = PERTURBED,
+    tolerances: Tolerances | None = None,
 ) -> Robustness:
     """Judge a controller on the first load of a task.
 
@@ -284,65 +260,6 @@ def _finite(values: NDArray) -> NDArray:
 def _noisy(judge: Judge, controller: Controller) -> float:
     runs = NOISE_SEEDS if any(judge.task.noise) else 1
     return float(_rmse(judge, [controller] * runs, None).mean())
-
-
-def perturbed_models(
-    model: ActuatorModel, count: int, seed: int, tolerances: Tolerances = PERTURBED
-) -> list[ActuatorModel]:
-    """The model with values moved at random, the same for the same seed.
-
-    Parameters
-    ----------
-    tolerances : mapping
-        k_e moves with k_t where it has no tolerance of its own. What the rig or a term refuses (a
-        negative inertia) is drawn again.
-
-    Raises
-    ------
-    InputError
-        If a quantity is none of the model's.
-    """
-    rng, found = np.random.default_rng(seed), []
-    for _ in range(count):
-        rig, terms = model.rig, list(model.terms)
-        for key, spread in tolerances.items():
-            if "." in key:
-                _move_term(terms, key, spread, rng)
-            elif not hasattr(rig, key):
-                raise InputError(f"tolerance of {key!r}: the rig has no such value")
-            elif getattr(rig, key) is not None:
-                rig = _moved(rig, key, spread, rng)
-            else:
-                rng.standard_normal()
-        k_t, k_e = model.rig.torque_constant_Nm_per_A, model.rig.back_emf_constant_Vs_per_rad
-        if k_e is not None and K_T in tolerances and K_E not in tolerances:
-            rig = replace(rig, **{K_E: k_e * rig.torque_constant_Nm_per_A / k_t})
-        found.append(replace(model, rig=rig, terms=tuple(terms)))
-    return found
-
-
-def _moved(held: Rig | Term, name: str, spread: float | Deviation, rng: np.random.Generator):
-    """A rig or a term with one value moved, by at most two deviations."""
-    value = getattr(held, name)
-    size = spread.size if isinstance(spread, Deviation) else spread * value
-    for _ in range(MOST_DRAWS):
-        away = size * float(np.clip(rng.standard_normal(), -2.0, 2.0))
-        if value > 0.0 and value + away < 0.0:
-            continue  # what is positive stays so
-        try:
-            return replace(held, **{name: value + away})
-        except RseaError:
-            continue
-    raise InputError(f"tolerance of {name!r}: no value within it is one that can be")
-
-
-def _move_term(terms: list, key: str, spread: float | Deviation, rng: np.random.Generator) -> None:
-    effect, _, name = key.partition(".")
-    for j, term in enumerate(terms):
-        if term.effect == effect and isinstance(getattr(term, name, None), float):
-            terms[j] = _moved(term, name, spread, rng)
-            return
-    raise InputError(f"tolerance of {key!r}: the machine has no such effect with such a number")
 
 
 def monte_carlo(judge: Judge, controller: Controller, models: Sequence[ActuatorModel]) -> NDArray:

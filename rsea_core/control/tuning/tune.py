@@ -6,9 +6,10 @@
 
 Every point is a controller of its own, compiled for what is known of the machine, and a whole
 generation runs side by side, so that the result depends on the seed and on nothing else. The
-bounds grow until the optimum is inside (`grown_bounds`); a linear loop that is unstable and a loop
-that swings on after a step have an infinite cost; the best points of all searches are judged again
-on the engine with located events, and the lowest of those that may be ranked (`standing`) is taken.
+bounds grow until the optimum is inside (`grown_bounds`); a loop that is unstable at rest, or nearer
+to -1 than the task allows, and one that swings on after a step have an infinite cost; the best
+points of each search are judged again on the engine with located events, and the lowest of those
+that may be ranked (`standing`) is taken.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.control.laws.base import Controller
+from rsea_core.control.stability.describing_functions import harmonic_loop
 from rsea_core.control.stability.margins import (
     STABLE_RADIUS,
     open_loop_response,
@@ -27,7 +29,7 @@ from rsea_core.control.tuning.grown_bounds import Accepts, AtBound, at_bounds, s
 from rsea_core.control.tuning.least_squares import Squares
 from rsea_core.control.tuning.optimisers import DEFAULT, Starts
 from rsea_core.control.tuning.search_record import LEADERS, Box, Search
-from rsea_core.control.tuning.standing import Standing, standing, swings_on
+from rsea_core.control.tuning.standing import Standing, fine_amplitudes, standing, swings_on
 from rsea_core.control.tuning.tune_task import (
     COSTS,
     FOLLOWED,
@@ -39,6 +41,8 @@ from rsea_core.control.tuning.tune_task import (
     squares_of,
 )
 from rsea_core.errors import InputError, RseaError
+from rsea_core.model.actuator_model import ActuatorModel
+from rsea_core.simulation.reference import largest_amplitude
 
 __all__ = ("COSTS", "FOLLOWED", "Task", "Tuned", "costs_of", "run_all", "tune")
 
@@ -60,6 +64,9 @@ class Tuned:
     standing : Standing
     fast_cost, precise_cost : float
         Of the controller, by the engine of the search and by the one that locates events.
+    by_seed : tuple of Controller
+        What each seed would have delivered: its best that may be ranked; seeds without one are
+        left out.
     """
 
     controller: Controller
@@ -69,6 +76,7 @@ class Tuned:
     standing: Standing
     fast_cost: float
     precise_cost: float
+    by_seed: tuple[Controller, ...]
 
 
 def tune(
@@ -135,7 +143,7 @@ class TaskCost:
         self.task, self.controller, self.names = task, controller, names
 
     def __call__(self, points: NDArray) -> NDArray:
-        """(n,) costs; infinite where a point is refused, its linear loop unstable, or swings on."""
+        """(n,) costs; infinite where a point is refused, its loop unstable, or swings on."""
         found, usable, tried, _ = self._usable(points)
         if usable:
             swings = swings_on(self.task, tried)
@@ -161,19 +169,57 @@ class TaskCost:
         return np.full(len(points), np.inf), usable, [made[j] for j in usable], slack
 
 
+SEARCHED_Hz, SEARCHED, BETWEEN = 1.0, 14, 7  # frequencies of a describing function in a search
+
+
 def _slack(task: Task, controller: Controller) -> float:
-    """Distance from -1 beyond what the task asks; -inf if unstable, inf if none is asked."""
-    linear = controller.has_gain_at_rest and not controller.gain_varies
-    if not linear or task.reference.unit != "Nm":
+    """Distance from -1 beyond what the task asks; -inf if unstable, inf if none is asked.
+
+    Of the loop at rest; of a fuzzy table also at the task's amplitude, where it has least damping
+    beside its integral, and at two of the smallest, of those that `standing` judges.
+    """
+    if not controller.has_gain_at_rest:
         return np.inf
     known = task.known_model or task.model
     if any(pole_radius(known, controller, load) >= STABLE_RADIUS for load in task.loads):
         return -np.inf
-    if task.least_modulus_margin == 0.0:
+    if task.least_modulus_margin == 0.0 or task.reference.unit != "Nm":
         return np.inf
     f = np.geomspace(0.1, 0.5 / controller.sample_time_s, 300)
     loops = (open_loop_response(known, controller, load, f) for load in task.loads)
-    return min(float(np.abs(1.0 + loop).min()) for loop in loops) - task.least_modulus_margin
+    rest = min(float(np.abs(1.0 + loop).min()) for loop in loops) - task.least_modulus_margin
+    if rest <= 0.0 or not controller.gain_varies:
+        return rest
+    for amplitude in (largest_amplitude(task.reference), *fine_amplitudes(task)[:3:2]):
+        rest = min(rest, _distance(known, controller, task, amplitude) - task.least_modulus_margin)
+        if rest <= 0.0:
+            break
+    return rest
+
+
+def _distance(known: ActuatorModel, controller: Controller, task: Task, amplitude: float) -> float:
+    """Smallest distance from -1 by the describing function: a coarse grid, then about its least."""
+    own = {"load": task.loads[0], "amplitude": amplitude}
+    f = np.geomspace(SEARCHED_Hz, 0.45 / controller.sample_time_s, SEARCHED)
+    found = np.abs(1.0 + harmonic_loop(controller, known, frequencies_Hz=f, **own))
+    j = int(found.argmin())
+    near = np.geomspace(f[max(j - 1, 0)], f[min(j + 1, f.size - 1)], BETWEEN + 2)[1:-1]
+    finer = np.abs(1.0 + harmonic_loop(controller, known, frequencies_Hz=near, **own))
+    return float(min(found[j], finer.min()))
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Judged:
+    """A point of a search, judged with located events."""
+
+    controller: Controller
+    cost: float
+    standing: Standing
+    at_bounds: tuple[AtBound, ...]
+
+    @property
+    def is_ranked(self) -> bool:
+        return self.standing.is_ranked and all(bound.is_physical for bound in self.at_bounds)
 
 
 def _chosen(
@@ -184,36 +230,51 @@ def _chosen(
     accepts: Accepts,
     engine: str,
 ) -> Tuned:
-    """The point of the lowest cost with located events that may be ranked, else the lowest."""
-    judged = []
+    """Of the best of each search the one of the lowest cost, those that may be ranked first."""
+    found = []
     for own in starts.searches:
-        for point in own.leaders[:LEADERS]:
-            made = with_values(controller, names, point)
-            if made is not None:
-                judged.append((precise_cost(task, made), made, own))
-    judged.sort(key=lambda entry: entry[0])
-    judged = judged or [(precise_cost(task, controller), controller, starts.best)]
-    first = None
-    for cost, made, own in judged:
-        found = standing(task, made)
-        point = np.array([getattr(made, name) for name in names])
-        at = at_bounds(point, Box(names=names, low=own.low, high=own.high), accepts)
-        chosen = made, found, at, cost
-        first = first or chosen
-        if found.is_ranked and all(bound.is_physical for bound in at):
-            break
-    else:
-        chosen = first
-    best, found, at, cost = chosen
+        points = [with_values(controller, names, point) for point in own.leaders[:LEADERS]]
+        made = sorted(
+            ((precise_cost(task, c), j, c) for j, c in enumerate(points) if c is not None),
+            key=lambda entry: entry[:2],
+        )
+        found.append(_first(task, names, own, made or [(np.inf, 0, controller)], accepts))
+    ranked = [each for each in found if each.is_ranked]
+    best = min(ranked or found, key=lambda each: each.cost)
     return Tuned(
-        controller=best,
+        controller=best.controller,
         starts=starts,
         engine=engine,
-        at_bounds=at,
-        standing=found,
-        fast_cost=float(costs_of(task, [best])[0]),
-        precise_cost=cost,
+        at_bounds=best.at_bounds,
+        standing=best.standing,
+        fast_cost=float(costs_of(task, [best.controller])[0]),
+        precise_cost=best.cost,
+        by_seed=tuple(each.controller for each in ranked),
     )
+
+
+def _first(
+    task: Task,
+    names: tuple[str, ...],
+    own: Search,
+    made: Sequence[tuple[float, int, Controller]],
+    accepts: Accepts,
+) -> _Judged:
+    """The first of a search's points that may be ranked, else the first of all."""
+    first = None
+    box = Box(names=names, low=own.low, high=own.high)
+    for cost, _, controller in made:
+        point = np.array([getattr(controller, name) for name in names])
+        judged = _Judged(
+            controller=controller,
+            cost=cost,
+            standing=standing(task, controller),
+            at_bounds=at_bounds(point, box, accepts),
+        )
+        first = first or judged
+        if judged.is_ranked:
+            return judged
+    return first
 
 
 def _box(controller: Controller, bounds: Mapping[str, tuple[float, float]]) -> Box:

@@ -25,10 +25,10 @@ from rsea_core.control.tuning.figures_of_merit import (
     following,
     limit_cycle,
     port_energy,
-    step_response,
 )
 from rsea_core.errors import InputError
 from rsea_core.simulation.reference import AngleReference
+from rsea_core.simulation.step_response import step_shape
 
 MODEL = ActuatorModel(Rig.preset("rsea-bench"))
 LOCKED = Load(kind="locked")
@@ -137,12 +137,15 @@ def test_step_figures_of_a_second_order_system():
     t = np.linspace(0.0, 5.0, 50_001)
     wd = w * math.sqrt(1.0 - z * z)
     y = 1.0 - np.exp(-z * w * t) * (np.cos(wd * t) + z * w / wd * np.sin(wd * t))
-    found = step_response(t, y)
+    found = step_shape(t, y, followed=1.0)
     assert found.overshoot_percent == pytest.approx(
         100.0 * math.exp(-math.pi * z / math.sqrt(1.0 - z * z)), rel=1e-3
     )
     assert found.settling_s == pytest.approx(0.81, abs=0.01)
     assert found.final == pytest.approx(1.0, abs=1e-3)
+    assert found.settling_to_final_s == pytest.approx(found.settling_s, abs=0.01)
+    swings = step_shape(t, y + 0.05 * np.sin(20.0 * t), followed=1.0, height=1.0)
+    assert swings.settling_s is None
 
 
 def test_the_motors_own_damping_takes_up_energy_and_a_fast_torque_loop_gives_some():

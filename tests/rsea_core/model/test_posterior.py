@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from rsea_core import ActuatorModel, Rig
-from rsea_core.control.tuning.robustness import Deviation, perturbed_models
 from rsea_core.effects import GearFriction
 from rsea_core.errors import RigError, RseaError
 from rsea_core.model.model_file import write_model
+from rsea_core.model.perturbed import Deviation, perturbed_models
 from rsea_core.model.posterior import read_posterior
 from rsea_core.scenarios.comparison_file import read_comparison
 

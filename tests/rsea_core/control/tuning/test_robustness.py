@@ -7,10 +7,11 @@ import pytest
 
 from rsea_core import ActuatorModel, Load, Reference, Rig
 from rsea_core.control import LqgTorque, PidTorque
-from rsea_core.control.tuning.robustness import Disturbance, perturbed_models, robustness
+from rsea_core.control.tuning.robustness import Disturbance, robustness
 from rsea_core.control.tuning.tune import Task, run_all
 from rsea_core.effects import GearFriction, LoadDisturbance
 from rsea_core.errors import InputError
+from rsea_core.model.perturbed import perturbed_models
 
 RIG = replace(Rig.preset("rsea-bench"), current_limit_A=None, motor_encoder_counts_per_rev=None,
               load_encoder_counts_per_rev=None)  # fmt: skip
