@@ -44,17 +44,16 @@ def text_of(task, found: Sizing, others: tuple[Comparison, ...], checked, wall_s
     for other in others:
         lines += other.lines()
     for one in checked:
-        contact = ", ".join(f"{w} {t:.1f}" for w, t in one.contact_Nm.items() if t is not None)
+        touches = (f"{w} {t:.1f} Nm" for w, t in one.contact_Nm.items() if t is not None)
+        contact = ", ".join(touches) or "none"
+        solid = one.stiffness_3d_Nm_per_rad
         lines.append(
-            f"{one.design.name} by 2D elements: width {one.design.width_m * 1e3:g} mm, K ="
-            f" {one.stiffness_2d_Nm_per_rad:.3f} Nm/rad, first contact {contact} Nm,"
-            f" {one.stress_Pa / 1e6:.0f} MPa"
+            f"{one.design.name} by finite elements: width {one.design.width_m * 1e3:g} mm, K ="
+            f" {one.stiffness_2d_Nm_per_rad:.3f} Nm/rad in 2D"
+            + ("" if solid is None else f", {solid:.3f} in 3D")
+            + f"; first contact {contact}, {one.stress_Pa / 1e6:.0f} MPa (2D curve"
+            + ("" if solid is None else ", torques by the 3D stiffness")
+            + ")"
         )
         lines += ["  " + check.line() for check in one.checks]
-        if one.stiffness_3d_Nm_per_rad is not None:
-            off = one.stiffness_3d_Nm_per_rad / task.stiffness_Nm_per_rad - 1
-            lines.append(
-                f"  3D elements: K = {one.stiffness_3d_Nm_per_rad:.3f} Nm/rad, {off * 100:+.2f} %"
-                " of the target"
-            )
     return "\n".join([*lines, f"{wall_s:.1f} s in all"])

@@ -1,4 +1,10 @@
-"""Finite elements of a sizing's winners: the first that keeps its limits there is the answer."""
+"""Finite elements of a sizing's winners: the first that keeps its limits there is the answer.
+
+The curve is plane stress, the stiffness that is judged is that of 3D elements: the width of a strip
+that is wide over its thickness stiffens it, which neither plane stress nor the search's rod knows.
+The ratio of both stiffnesses is also applied to the torques of first contact, whose angles are the
+plane model's. Stress over torque is left as plane stress has it.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -25,10 +31,11 @@ _STATES = 5
 
 @dataclass(frozen=True, kw_only=True)
 class Confirmed:
-    """A candidate with what plane-stress elements find, and the 3D stiffness of the accepted one.
+    """A candidate with what finite elements find.
 
-    ``design`` has the width that its 2D stiffness asks for, which may be a step of the grid beside
-    the rod's choice. ``stiffness_3d_Nm_per_rad`` is None where it was not accepted.
+    ``design`` has the width that its stiffness asks for, which may be steps of the grid beside
+    the rod's choice. ``stiffness_3d_Nm_per_rad`` is None where plane stress alone refused it; else
+    the checks judge it, and ``contact_Nm`` are plane stress's times the ratio of both stiffnesses.
     """
 
     candidate: Candidate
@@ -41,7 +48,12 @@ class Confirmed:
 
     @property
     def accepted(self) -> bool:
-        """Whether no limit is broken."""
+        """Whether no limit is broken, the stiffness by 3D elements."""
+        return self.stiffness_3d_Nm_per_rad is not None and self.kept
+
+    @property
+    def kept(self) -> bool:
+        """Whether no limit is broken so far."""
         return not any(check.passed is False for check in self.checks)
 
 
@@ -53,7 +65,9 @@ def confirm(
     store: ContentStore | None = None,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> tuple[Confirmed, ...]:
-    """Judge winners by 2D elements in their order until one is accepted; then its 3D stiffness.
+    """Judge winners in their order until one is accepted: 2D elements, then the 3D stiffness.
+
+    Where 3D elements break a limit, the width is scaled once to the asked stiffness.
 
     Raises
     ------
@@ -62,22 +76,106 @@ def confirm(
     """
     tried: list[Confirmed] = []
     for rank, candidate in enumerate(winners[:most]):
-        found = judge_2d(
-            task, as_design(task, candidate, f"{task.name}-{rank + 1}"), candidate, store
-        )
+        design = as_design(task, candidate, f"{task.name}-{rank + 1}")
+        found = judge_2d(task, design, candidate, store)
         on_progress(f"2D elements of winner {rank + 1}: {_text(found)}")
-        if found.accepted:
-            solid = stiffness_3d(found.design)
-            on_progress(f"3D elements: K = {solid:.3f} Nm/rad")
-            return (*tried, replace(found, stiffness_3d_Nm_per_rad=solid))
+        if found.kept:
+            found = _judge_3d(task, found.design, candidate, store, on_progress)
+            other = _rescaled(task, found)
+            if not found.kept and other.width_m != found.design.width_m:
+                found = _judge_3d(task, other, candidate, store, on_progress)
         tried.append(found)
+        if found.accepted:
+            break
     return tuple(tried)
 
 
-def judge_2d(
-    task: SizingTask, design: SpringDesign, candidate: Candidate, store: ContentStore | None
+def _rescaled(task: SizingTask, found: Confirmed) -> SpringDesign:
+    """The design with the width of the grid that the 3D stiffness asks for, in proportion."""
+    solid = found.stiffness_3d_Nm_per_rad or found.stiffness_2d_Nm_per_rad
+    grid = task.by_name["width_mm"]
+    width_mm = 1e3 * found.design.width_m * task.stiffness_Nm_per_rad / solid
+    return replace(found.design, width_m=grid.value(grid.nearest(width_mm)) * 1e-3)
+
+
+def _judge_3d(
+    task: SizingTask,
+    design: SpringDesign,
+    candidate: Candidate,
+    store: ContentStore | None,
+    on_progress: Callable[[str], None],
 ) -> Confirmed:
-    """Curve of a design by plane-stress elements, its width set anew, and the task's checks.
+    """The plane-stress curve of a width with that width's 3D stiffness, and the task's checks."""
+    solid = stiffness_3d(design)
+    found = judge_2d(task, design, candidate, store, stiffness_3d_Nm_per_rad=solid)
+    on_progress(
+        f"3D elements, width {1e3 * design.width_m:g} mm: K = {solid:.3f} Nm/rad, {_text(found)}"
+    )
+    return found
+
+
+def judge_2d(
+    task: SizingTask,
+    design: SpringDesign,
+    candidate: Candidate,
+    store: ContentStore | None,
+    *,
+    stiffness_3d_Nm_per_rad: float | None = None,
+) -> Confirmed:
+    """Curve of a design by plane-stress elements and the task's checks.
+
+    The width is set anew by the plane-stress stiffness. With the 3D stiffness of the design's own
+    width that is kept and judged, and torques and stresses at an angle are scaled to it.
+
+    Raises
+    ------
+    SolveError
+        If the mesh or the solve fails.
+    """
+    problem, curve = _plane_curve(design, store)
+    if stiffness_3d_Nm_per_rad is None:
+        design = _of_asked_width(task, design, problem, curve["stiffness_Nm_per_rad"])
+    by_torque, by_stress = problem.factors(design)
+    stiffness = by_torque * curve["stiffness_Nm_per_rad"]
+    judged, over_plane, model = stiffness, 1.0, curve["model"]
+    if stiffness_3d_Nm_per_rad is not None:
+        judged, model = stiffness_3d_Nm_per_rad, "3D hex20"
+        over_plane = judged / stiffness
+    by_torque, by_stress = over_plane * by_torque, over_plane * by_stress
+    torque = by_torque * np.array(curve["torque_Nm"])
+    stress = by_stress * np.array(curve["peak_stress_Pa"])
+    contact = {
+        direction: None if touch is None else abs(by_torque * touch["torque_Nm"])
+        for direction, touch in curve["contact_onset"].items()
+    }
+    asked = task.operating_torque_Nm
+    worst = {direction: stress_at(asked, sign * torque, stress) for direction, sign in SIGN.items()}
+    reached = {direction: float(np.max(sign * torque)) for direction, sign in SIGN.items()}
+    needs = task.requirements
+    return Confirmed(
+        candidate=candidate,
+        design=design,
+        stiffness_2d_Nm_per_rad=stiffness,
+        contact_Nm=contact,
+        stress_Pa=max(worst.values()),
+        stiffness_3d_Nm_per_rad=stiffness_3d_Nm_per_rad,
+        checks=(
+            *stiffness_check(needs, judged, model),
+            *contact_checks(needs, contact, reached),
+            *yield_check(
+                needs,
+                stress_per_torque={direction: value / asked for direction, value in worst.items()},
+                yield_strength_Pa=design.material.yield_strength_Pa,
+                no_strengths=design.material.no_strengths,
+            ),
+            *_life_check(task, design, max(worst.values())),
+            *_other_checks(task, design, contact),
+        ),
+    )
+
+
+def _plane_curve(design: SpringDesign, store: ContentStore | None) -> tuple[SharedProblem, dict]:
+    """The plane-stress curve per unit of modulus and width, and what its factors come from.
 
     Raises
     ------
@@ -94,43 +192,17 @@ def judge_2d(
             store.put(problem.key, solved)
     if "failure" in solved:
         raise SolveError(f"{design.name}: {solved['failure']}")
-    curve = solved["curve"]
+    return problem, solved["curve"]
+
+
+def _of_asked_width(
+    task: SizingTask, design: SpringDesign, problem: SharedProblem, shared_Nm_per_rad: float
+) -> SpringDesign:
+    """The design with the grid's width at which plane stress has the asked stiffness."""
     grid = task.by_name["width_mm"]
-    per_width = problem.factors(design)[0] * curve["stiffness_Nm_per_rad"] / design.width_m
+    per_width = problem.factors(design)[0] * shared_Nm_per_rad / design.width_m
     width_mm = grid.value(grid.nearest(1e3 * task.stiffness_Nm_per_rad / per_width))
-    design = replace(design, width_m=width_mm * 1e-3)
-    by_torque, by_stress = problem.factors(design)
-    torque = by_torque * np.array(curve["torque_Nm"])
-    stress = by_stress * np.array(curve["peak_stress_Pa"])
-    contact = {
-        direction: None if touch is None else abs(by_torque * touch["torque_Nm"])
-        for direction, touch in curve["contact_onset"].items()
-    }
-    asked = task.operating_torque_Nm
-    worst = {direction: stress_at(asked, sign * torque, stress) for direction, sign in SIGN.items()}
-    stiffness = by_torque * curve["stiffness_Nm_per_rad"]
-    reached = {direction: float(np.max(sign * torque)) for direction, sign in SIGN.items()}
-    needs = task.requirements
-    return Confirmed(
-        candidate=candidate,
-        design=design,
-        stiffness_2d_Nm_per_rad=stiffness,
-        contact_Nm=contact,
-        stress_Pa=max(worst.values()),
-        checks=(
-            *stiffness_check(needs, stiffness),
-            *contact_checks(needs, contact, reached),
-            *yield_check(
-                needs,
-                stress_per_torque={direction: value / asked for direction, value in worst.items()},
-                yield_strength_Pa=design.material.yield_strength_Pa,
-                no_strengths=design.material.no_strengths,
-                material=design.material,
-            ),
-            *_life_check(task, design, max(worst.values())),
-            *_other_checks(task, design, contact),
-        ),
-    )
+    return replace(design, width_m=width_mm * 1e-3)
 
 
 def _other_checks(

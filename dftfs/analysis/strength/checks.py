@@ -35,8 +35,13 @@ class Check:
         return f"{verdict}  {self.name}: {value}{required}{note}{source}"
 
 
-def stiffness_check(requirements: Requirements, stiffness_Nm_per_rad: float) -> list[Check]:
-    """Tangent stiffness at rest within the required band; nothing where none is stated."""
+def stiffness_check(
+    requirements: Requirements, stiffness_Nm_per_rad: float, model: str
+) -> list[Check]:
+    """Tangent stiffness at rest within the required band; nothing where none is stated.
+
+    ``model`` is what it was computed by.
+    """
     asked = requirements.stiffness_Nm_per_rad
     if asked is None:
         return []
@@ -49,6 +54,7 @@ def stiffness_check(requirements: Requirements, stiffness_Nm_per_rad: float) -> 
             limit=f"{asked:g} Nm/rad +- {band * 100:g} %",
             passed=abs(stiffness_Nm_per_rad / asked - 1) <= band,
             note=f"{(stiffness_Nm_per_rad / asked - 1) * 100:+.1f} %",
+            source=model,
         )
     ]
 

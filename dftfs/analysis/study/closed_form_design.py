@@ -114,7 +114,7 @@ def _checks(design: SpringDesign, rod: RodCurve, touches: Mapping) -> tuple[Chec
     onset_Nm = {name: abs(t.torque_Nm) if t else None for name, t in touches.items()}
     ends = {WINDING: float(np.max(rod.torque_Nm)), UNWINDING: float(-np.min(rod.torque_Nm))}
     return (
-        *stiffness_check(asked, rod.stiffness_Nm_per_rad),
+        *stiffness_check(asked, rod.stiffness_Nm_per_rad, "rod model"),
         *contact_checks(asked, onset_Nm, ends),
         _neck_check(design),
     )

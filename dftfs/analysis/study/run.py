@@ -205,7 +205,7 @@ def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, .
         name: solid.stress_at_torque_Pa(sign * torque) / torque for name, sign in SIGN.items()
     }
     return (
-        *stiffness_check(asked, solid.stiffness_Nm_per_rad),
+        *stiffness_check(asked, solid.stiffness_Nm_per_rad, solid.model),
         *contact_checks(asked, onsets, reached),
         *yield_check(
             asked,
