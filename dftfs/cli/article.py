@@ -35,9 +35,12 @@ def run(arguments: argparse.Namespace) -> int:
 def _text(name: str, found: FirstArticle) -> str:
     change = found.predicted_Nm_per_rad / found.nominal_Nm_per_rad - 1
     arms = ", ".join(f"{value:.3f}" for value in found.arms_mm)
+    how = "rod model"
+    if found.over_rod is not None:
+        how += f", times {found.over_rod:.4g} to the sheet's 3D elements"
     lines = [
         f"{name}: K = {found.predicted_Nm_per_rad:.2f} Nm/rad +- {100 * found.uncertainty:.1f} %"
-        f" by these dimensions (rod model; {100 * change:+.2f} % of nominal)",
+        f" by these dimensions ({how}; {100 * change:+.2f} % of nominal)",
         f"arms {arms} mm, width {found.width_mm:.3f} mm, fillets {found.fillet_mm:.3f} mm;"
         f" {found.not_measured} rows are not measured and count as nominal",
     ]

@@ -68,10 +68,15 @@ def run(arguments: argparse.Namespace) -> int:
     folder = prepared(arguments, arguments.out or Path("out") / f"deliver-{design.name}")
     target = folder / f"{design.name}-{arguments.revision}.zip"
     refuse_existing([target], force=arguments.force)
-    tolerance = drawing_tolerance(design, process, share=arguments.yield_percent / 100)
+    result, plane = solved_for_delivery(design, say)
+    tolerance = drawing_tolerance(
+        design,
+        process,
+        share=arguments.yield_percent / 100,
+        solid_Nm_per_rad=result.stiffness_Nm_per_rad,
+    )
     say(tolerance.line())
-    result, stiffness = solved_for_delivery(design, say)
-    found = certificate(design, result, stiffness, process, tolerance)
+    found = certificate(design, result, plane, process, tolerance)
     shop = ShopData(
         part_number=arguments.part,
         revision=arguments.revision,

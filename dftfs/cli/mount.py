@@ -5,6 +5,9 @@ import argparse
 from dftfs.analysis.structure.mounting import Bolts, Mount, Seat, mounted_stiffness
 from dftfs.cli.common import add_design, add_output, emit, read_design
 from dftfs.errors import DesignError
+from dftfs.spring.rod import wide_over_plane
+
+_WORTH_SAYING = 0.005  # by which a wide strip is stiffer than plane stress
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -73,11 +76,20 @@ def run(arguments: argparse.Namespace) -> int:
         f"{design.name} (2D, linear): K = {found.rigid_Nm_per_rad:.3f} Nm/rad with rigid edges,"
         f" {found.mounted_Nm_per_rad:.3f} as mounted ({100 * found.change:+.2f} %)"
     ]
+    material = design.material
+    elastic = material.youngs_modulus_Pa, material.poisson_ratio
+    wide = wide_over_plane(design.outline, design.width_m, *elastic)
+    if wide > 1 + _WORTH_SAYING:
+        lines.append(
+            f"plane stress is {100 * (wide - 1):.1f} % too soft for so wide a strip (rod model):"
+            " the change in percent stays, both stiffnesses are higher"
+        )
     for where, torque in slips.items():
         verdict = "" if asked is None else ("; pass" if torque >= asked else "; FAIL")
         needs = "" if asked is None else f", {asked:g} Nm in operation"
         lines.append(f"the {where}'s joint slips at {torque:.3g} Nm{needs}{verdict}")
     record = {"design": design.name, "stiffness": found, "change": found.change, "slip_Nm": slips}
+    record["wide_over_plane"] = wide
     emit(record, "\n".join(lines), as_json=arguments.json)
     return 1 if asked is not None and any(torque < asked for torque in slips.values()) else 0
 

@@ -32,7 +32,12 @@ from dftfs.spring.planar_rod import (
     twist_stiffness,
 )
 from dftfs.spring.rod_kernel import element_nodes
-from dftfs.spring.section import curved_strip_stress, in_plane_inertia, section_area
+from dftfs.spring.section import (
+    curved_strip_stress,
+    in_plane_inertia,
+    section_area,
+    wide_strip_factor,
+)
 
 # Root lengths over the strip's thickness: constant, per fillet radius over thickness, and (hub
 # only) per thickness over radius of curvature at the fillet's foot.
@@ -235,6 +240,7 @@ def arm_rod(
     *,
     roots: RootLengths | None = None,
     elements_per_turn: int = _ELEMENTS_PER_TURN,
+    wide: bool = False,
 ) -> ArmRod:
     """Arm 0 between the notch fillet's and the slit fillet's foot as a rod.
 
@@ -242,6 +248,8 @@ def arm_rod(
     ----------
     roots : RootLengths, optional
         `root_lengths` of the outline without it; zero lengths clamp the arm at the feet.
+    wide : bool
+        With `wide_strip_factor`, as in 3D; without it all is proportional to the width.
 
     Raises
     ------
@@ -261,20 +269,20 @@ def arm_rod(
     # a clamped arm keeps its two root elements, of next to no length: one layout of nodes for all
     hub, slit = (max(length, 1e-6 * arc[-1]) for length in (roots.hub_m, roots.slit_m))
     before, after = -hub * np.array([1.0, 0.5]), slit * np.array([0.5, 1.0])
-    nodes = [point[0] + before[:, None] * tangent[0], point]
-    nodes += [point[-1] + after[:, None] * tangent[-1]]
+    ends = point[0] + before[:, None] * tangent[0], point[-1] + after[:, None] * tangent[-1]
     curvature = np.pad(line.curvature(theta), 2, mode="edge")[element_nodes(len(theta) + 4)]
     thickness = np.pad(p.thickness_at(theta), 2, mode="edge")[element_nodes(len(theta) + 4)]
     inertia = curved_bar_inertia(thickness, width_m, curvature)
+    if wide:
+        inertia = inertia * wide_strip_factor(width_m, thickness, curvature, poisson_ratio)
     inertia[-1] *= slit / (slit + roots.neck_m)
     area = section_area(thickness, width_m)
-    shear_modulus = youngs_modulus_Pa / (2 * (1 + poisson_ratio))
     rod = Rod(
-        nodes_m=np.concatenate(nodes),
+        nodes_m=np.concatenate([ends[0], point, ends[1]]),
         angles_rad=np.pad(angle, 2, mode="edge"),
         bending_stiffness_Nm2=youngs_modulus_Pa * inertia,
         axial_stiffness_N=youngs_modulus_Pa * area,
-        shear_stiffness_N=_SHEAR_FACTOR * shear_modulus * area,
+        shear_stiffness_N=_SHEAR_FACTOR * youngs_modulus_Pa / (2 * (1 + poisson_ratio)) * area,
     )
     return ArmRod(
         rod=rod,
@@ -294,6 +302,7 @@ def rod_curve(
     deflections_rad: ArrayLike,
     *,
     roots: RootLengths | None = None,
+    wide: bool = False,
 ) -> RodCurve:
     """Torque of the whole spring at the given deflections of the rim, large rotations included.
 
@@ -301,7 +310,7 @@ def rod_curve(
     ----------
     deflections_rad : (k,) array
         Positive winds the arms onto the hub, negative unwinds them; any order.
-    roots : RootLengths, optional
+    roots, wide : optional
         As for `arm_rod`.
 
     Raises
@@ -311,7 +320,7 @@ def rod_curve(
     SolveError
         If a deflection cannot be reached; the message names it.
     """
-    arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots)
+    arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots, wide=wide)
     deflections = np.atleast_1d(np.asarray(deflections_rad, dtype=float))
     if deflections.ndim != 1 or not np.isfinite(deflections).all():
         raise DesignError("deflections_rad must be finite numbers, one after the other")
@@ -348,6 +357,15 @@ def twist_arm(arm: ArmRod, deflections_rad: Sequence[float] | NDArray) -> list[R
             state = twist_rod(arm.rod, deflections[index], state)
             states[index] = state
     return [states[index] for index in range(len(deflections))]
+
+
+def wide_over_plane(
+    outline: SpringOutline, width_m: float, youngs_modulus_Pa: float, poisson_ratio: float
+) -> float:
+    """Stiffness at rest of an arm whose width resists to curl, over that in plane stress."""
+    elastic = (width_m, youngs_modulus_Pa, poisson_ratio)
+    plane, wide = (arm_rod(outline, *elastic, wide=wide) for wide in (False, True))
+    return twist_stiffness(wide.rod) / twist_stiffness(plane.rod)
 
 
 def _peak_stress(arm: ArmRod, state: RodState) -> float:

@@ -54,6 +54,7 @@ def contact_onset(
     *,
     limit_rad: float = 1.5,
     roots: RootLengths | None = None,
+    wide: bool = False,
 ) -> Onset:
     """Where the coils first touch, winding and unwinding.
 
@@ -61,7 +62,7 @@ def contact_onset(
     ----------
     limit_rad : float
         How far to look in each direction.
-    roots : RootLengths, optional
+    roots, wide : optional
         As for `dftfs.spring.rod.arm_rod`.
 
     Raises
@@ -73,7 +74,7 @@ def contact_onset(
     """
     if not (np.isfinite(limit_rad) and limit_rad > 0):
         raise DesignError(f"limit_rad = {limit_rad!r} must be positive")
-    arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots)
+    arm = arm_rod(outline, width_m, youngs_modulus_Pa, poisson_ratio, roots=roots, wide=wide)
     samples = sample_coil_gap(outline, _SPACING * outline.parameters.outer_radius_m)
     rest = twist_rod(arm.rod, 0.0)
     gap = state_clearance(arm, samples, rest)

@@ -19,6 +19,8 @@ from dftfs.errors import DesignError
 
 # Below this x the closed form loses more digits than the series leaves out (1e-13 either way).
 _SERIES_BELOW = 0.03
+# Of the parameter p of `wide_strip_factor`: its series below, its limit above (F is 1 to 1e-13).
+_NARROW, _WIDE = 0.1, 30.0
 
 
 def section_area(thickness_m: ArrayLike, width_m: float) -> ArrayLike:
@@ -43,6 +45,48 @@ def in_plane_inertia(thickness_m: ArrayLike, width_m: float) -> ArrayLike:
     """
     _require_section(thickness_m, width_m)
     return width_m * thickness_m**3 / 12.0
+
+
+def wide_strip_factor(
+    width_m: float, thickness_m: ArrayLike, curvature_per_m: ArrayLike, poisson_ratio: float
+) -> NDArray:
+    """Bending stiffness of a curved strip over E I, because its width resists to curl.
+
+    Across its width a bent strip curls the other way (anticlastic bending) with nu times the
+    change of curvature. Where the strip is curved, the radial displacement u(y) of that curl
+    stretches its fibres by u / R: over a width far above sqrt(R t) the curl is confined to the
+    edges and the stiffness tends to E I / (1 - nu^2), that of a plate. With D = E t^3 / 12 / (1 -
+    nu^2) and the change of curvature k
+
+        D u_yyyy + E t u / R^2 = 0,   u_yy = -nu k and u_yyy = 0 at y = +- w / 2
+        M = D (w k + 2 nu u_y(w / 2)) = D w k (1 - 2 nu^2 F / p)
+        p = (3 (1 - nu^2))^(1/4) w / sqrt(R t),   F = (cosh p - cos p) / (sinh p + sin p)
+
+    so that the factor is (1 - 2 nu^2 F / p) / (1 - nu^2), 1 + nu^2 p^4 / 180 / (1 - nu^2) where p
+    is small. Stiffness only: the stress that a moment makes is left at the strip's.
+
+    Parameters
+    ----------
+    curvature_per_m : float or (n,) array
+        1 / R of the unloaded centreline; the sign is ignored.
+
+    Source
+    ------
+    H. Lamb, "On the flexure of a flat elastic spring", Phil. Mag. 31 (1891) 182; G. F. C. Searle,
+    Experimental Elasticity (1908): the parameter w^2 / (R t); D. G. Ashwell, "The anticlastic
+    curvature of rectangular beams and plates", J. R. Aeronaut. Soc. 54 (1950) 708. They bend a flat
+    plate to R; here R is that of the unloaded strip and k a small change, which makes the same
+    equation.
+    """
+    _require_section(thickness_m, width_m)
+    nu = poisson_ratio
+    bend = np.abs(np.atleast_1d(np.asarray(curvature_per_m, dtype=float)))
+    p = (3 * (1 - nu**2)) ** 0.25 * width_m * np.sqrt(bend / thickness_m)
+    inside = np.clip(p, _NARROW, _WIDE)
+    share = (np.cosh(inside) - np.cos(inside)) / (np.sinh(inside) + np.sin(inside))
+    share = np.where(p > _WIDE, 1.0, share) / np.maximum(p, _NARROW)
+    closed = (1 - 2 * nu**2 * share) / (1 - nu**2)
+    return np.where(p < _NARROW, 1 + nu**2 * p**4 / 180 / (1 - nu**2), closed)
 
 
 def curved_strip_stress(

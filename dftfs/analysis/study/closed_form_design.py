@@ -49,9 +49,9 @@ def closed_form_design(design: SpringDesign) -> ClosedFormDesign:
     """
     outline, material = design.outline, design.material
     elastic = (design.width_m, material.youngs_modulus_Pa, material.poisson_ratio)
-    onset = contact_onset(outline, *elastic)
+    onset = contact_onset(outline, *elastic, wide=True)
     touches = {WINDING: onset.winding, UNWINDING: onset.unwinding}
-    rod = rod_curve(outline, *elastic, _deflections(onset))
+    rod = rod_curve(outline, *elastic, _deflections(onset), wide=True)
     samples = sample_coil_gap(outline, 2e-3 * outline.parameters.outer_radius_m)
     gap = measure_clearance(
         samples.floor_m, samples.ceiling_m, deepest_m=design.spiral.thickness_m / 2

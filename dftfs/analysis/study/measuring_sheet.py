@@ -2,7 +2,9 @@
 
 Each arm is a rod of its own measured thickness (a line through its places, relative to nominal),
 all of the measured width and fillet radius; the arms' stiffnesses add up. Rows left empty count
-as nominal. What stays unknown is the modulus, 2 % at two standard deviations, and the gauge.
+as nominal. The sheet states the nominal stiffness by 3D elements; a part's is the rod's, times 3D
+over rod of the nominal dimensions. What stays unknown is the modulus, 2 % at two standard
+deviations, and the gauge.
 """
 
 import csv
@@ -26,6 +28,7 @@ from rsea_core.files.bounded_text import read_bounded
 COLUMNS = ("characteristic", "nominal_mm", "least_mm", "most_mm", "measured_mm")
 PLACES = {"near the hub": 0.2, "in the middle": 0.5, "near the rim": 0.85}  # of the sweep
 _WIDTH, _STIFFNESS = "axial width", "stiffness at rest, Nm/rad"
+_SOLID = "computed: nominal stiffness by 3D elements, Nm/rad"  # nothing to measure
 _FILLETS = tuple(f"fillet radius {detail}" for detail in "WXYZ")  # the drawing's details
 _MODULUS = 0.02  # two standard deviations
 _SLOPE = 3.0  # of K over the thickness, for the gauge's share
@@ -36,6 +39,9 @@ _MOST_BYTES = 1_000_000
 @dataclass(frozen=True, kw_only=True)
 class FirstArticle:
     """What a part's dimensions give. ``uncertainty`` is relative, at two standard deviations.
+
+    ``over_rod`` is the 3D stiffness over the rod's that both stiffnesses contain, None where the
+    sheet states none.
 
     ``arms_mm`` : mean thickness of each arm. ``measured_Nm_per_rad`` is None where the bench's row
     is empty; ``modulus_Pa`` is then what that stiffness says of the material.
@@ -52,6 +58,7 @@ class FirstArticle:
     measured_Nm_per_rad: float | None
     modulus_Pa: float | None
     required: tuple[float, float] | None
+    over_rod: float | None = None
 
 
 def strip_row(arm: int, place: str) -> str:
@@ -59,10 +66,13 @@ def strip_row(arm: int, place: str) -> str:
     return f"strip thickness, arm {arm + 1}, {place}"
 
 
-def measuring_sheet(design: SpringDesign, tolerance: DrawingTolerance) -> str:
+def measuring_sheet(
+    design: SpringDesign, tolerance: DrawingTolerance, solid_Nm_per_rad: float | None = None
+) -> str:
     """CSV of the dimensions to measure: nominal, limits, room for the finding, in mm.
 
     The bore is H7; what else is cut may lie anywhere in the zone of the profile.
+    ``solid_Nm_per_rad`` is the stiffness by 3D elements, for `first_article`.
     """
     p, t = design.spiral, tolerance
     edge, bore = t.profile_m / 2, 2 * p.bore_radius_m
@@ -87,11 +97,15 @@ def measuring_sheet(design: SpringDesign, tolerance: DrawingTolerance) -> str:
     stiffness, share = t.stiffness_Nm_per_rad, t.stiffness_tolerance
     limits = (stiffness * (1 + sign * share) for sign in (0, -1, 1))
     writer.writerow((_STIFFNESS, *(f"{value:.3f}" for value in limits), ""))
+    if solid_Nm_per_rad is not None:
+        writer.writerow((_SOLID, f"{solid_Nm_per_rad:.5g}", "", "", ""))
     return text.getvalue()
 
 
 def read_sheet(path: Path) -> tuple[dict[str, float], tuple[str, ...], int]:
     """Measured values by characteristic, those outside their limits, and how many are empty.
+
+    The values include the 3D stiffness that the sheet states.
 
     Raises
     ------
@@ -105,9 +119,12 @@ def read_sheet(path: Path) -> tuple[dict[str, float], tuple[str, ...], int]:
             f"{path}: no measuring sheet: its first line must be {','.join(COLUMNS)}, as"
             " `dftfs deliver` writes it"
         )
-    found, outside, empty = {}, [], 0
+    found, outside, empty, stated = {}, [], 0, {}
     for row in reader:
         name, value = row["characteristic"], (row["measured_mm"] or "").strip()
+        if name == _SOLID:
+            stated = {name: _positive(path, name, row["nominal_mm"])}
+            continue
         if not value:
             empty += 1
             continue
@@ -121,7 +138,17 @@ def read_sheet(path: Path) -> tuple[dict[str, float], tuple[str, ...], int]:
             outside.append(f"{name} {found[name]:g} is not {low:g} to {high:g}")
     if not found:
         raise DesignError(f"{path}: nothing is measured: fill in the column measured_mm")
-    return found, tuple(outside), empty
+    return found | stated, tuple(outside), empty
+
+
+def _positive(path: Path, name: str, text: str | None) -> float:
+    try:
+        value = float(text or "")
+    except ValueError:
+        value = np.nan
+    if not 0 < value < np.inf:
+        raise DesignError(f"{path}: {name}: {text!r} is no stiffness, e.g. 66.08")
+    return value
 
 
 def first_article(design: SpringDesign, path: Path, *, gauge_mm: float = 0.003) -> FirstArticle:
@@ -136,18 +163,20 @@ def first_article(design: SpringDesign, path: Path, *, gauge_mm: float = 0.003) 
         raise DesignError(f"--gauge-mm {gauge_mm:g} must be 0 to below 1, for example 0.003")
     found, outside, empty = read_sheet(path)
     p, nominal = design.spiral, _stiffness(design, [design.spiral] * design.n_arms, design.width_m)
+    over_rod = found[_SOLID] / nominal if _SOLID in found else None
     width_m = 1e-3 * found.get(_WIDTH, 1e3 * design.width_m)
     radii = [1e-3 * found[name] for name in _FILLETS if name in found]
     fillet_m = float(np.mean(radii)) if radii else p.fillet_radius_m
     arms = [_as_measured(p, found, arm, fillet_m) for arm in range(design.n_arms)]
-    predicted = _stiffness(design, arms, width_m)
+    predicted = (over_rod or 1.0) * _stiffness(design, arms, width_m)
     count = max(1, sum(name.startswith("strip") for name in found))
     gauge = _SLOPE * 1e-3 * gauge_mm / p.thickness_m / np.sqrt(count)
     measured, asked = found.get(_STIFFNESS), design.requirements
     k, band = asked.stiffness_Nm_per_rad, asked.stiffness_tolerance
     modulus = design.material.youngs_modulus_Pa
     return FirstArticle(
-        nominal_Nm_per_rad=nominal,
+        nominal_Nm_per_rad=(over_rod or 1.0) * nominal,
+        over_rod=over_rod,
         predicted_Nm_per_rad=predicted,
         uncertainty=float(np.hypot(_MODULUS, gauge)),
         arms_mm=tuple(1e3 * float(np.mean(_strip(p, found, a))) for a in range(design.n_arms)),
@@ -197,8 +226,6 @@ def _stiffness(design: SpringDesign, arms: list[SpiralParameters], width_m: floa
     material, known = design.material, {}
     for p in arms:
         if p not in known:
-            rod = arm_rod(
-                build_outline(p), width_m, material.youngs_modulus_Pa, material.poisson_ratio
-            ).rod
-            known[p] = twist_stiffness(rod)
+            elastic = material.youngs_modulus_Pa, material.poisson_ratio
+            known[p] = twist_stiffness(arm_rod(build_outline(p), width_m, *elastic, wide=True).rod)
     return float(sum(known[p] for p in arms))

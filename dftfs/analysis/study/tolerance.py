@@ -290,8 +290,8 @@ def _solved(
     outline = build_outline(shifted(design.spiral, thickness_m, kerf_m, fillet_m))
     material = design.material
     elastic = (design.width_m, material.youngs_modulus_Pa, material.poisson_ratio)
-    arm = arm_rod(outline, *elastic)
-    onset = contact_onset(outline, *elastic)
+    arm = arm_rod(outline, *elastic, wide=True)
+    onset = contact_onset(outline, *elastic, wide=True)
     stiffness = design.n_arms * twist_stiffness(arm.rod)
     torques = [np.nan if t is None else abs(t.torque_Nm) for t in (onset.winding, onset.unwinding)]
     return stiffness, torques[0], torques[1]

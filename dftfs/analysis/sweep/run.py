@@ -18,6 +18,7 @@ from dftfs.analysis.torsion.batch_solve import SharedProblem, solve_shared
 from dftfs.analysis.torsion.result import SIGN
 from dftfs.design import SpringDesign, load_design
 from dftfs.errors import DesignError, DftfsError
+from dftfs.spring.rod import wide_over_plane
 
 Row = dict[str, object]
 Runner = Callable[[Callable, Mapping[str, object]], Iterator[tuple[str, dict]]]
@@ -190,8 +191,16 @@ def plain_value(text: str) -> object:
 
 
 def _results(design: SpringDesign, problem: SharedProblem, curve: Mapping) -> Row:
-    """The shared curve with the design's factors, judged with its strengths."""
-    by_torque, by_stress = problem.factors(design)
+    """The shared curve with the design's factors, judged with its strengths.
+
+    Torque and stress at an angle of the plane models, which do not know that a wide strip resists
+    to curl, are scaled by the rod's ratio of both stiffnesses; stress over torque stays.
+    """
+    material, wide = design.material, 1.0
+    if problem.model != "3d":
+        elastic = material.youngs_modulus_Pa, material.poisson_ratio
+        wide = wide_over_plane(design.outline, design.width_m, *elastic)
+    by_torque, by_stress = (wide * factor for factor in problem.factors(design))
     torque = by_torque * np.array(curve["torque_Nm"])
     stress = by_stress * np.array(curve["peak_stress_Pa"])
     found: Row = {

@@ -11,6 +11,7 @@ from dftfs.spring.section import (
     curved_strip_stress,
     in_plane_inertia,
     section_area,
+    wide_strip_factor,
 )
 
 few = settings(deadline=None, max_examples=40, derandomize=True)
@@ -166,3 +167,33 @@ def test_area_and_inertias_of_the_rectangle():
 def test_impossible_sections_are_refused_with_field_and_limit(call, message):
     with pytest.raises(DesignError, match=message):
         call()
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.342])
+def test_a_wide_strip_bends_from_a_beam_to_a_plate(nu):
+    """Lamb's edge problem solved by differences: D u_yyyy + E t u / R^2 = 0, u_yy = -nu k."""
+    radius, thickness = 25e-3, 1e-3
+    widths = np.array([0.5e-3, 5e-3, 15e-3, 30e-3, 1.0])
+    got = [float(wide_strip_factor(w, thickness, 1 / radius, nu)[0]) for w in widths]
+    assert got[0] == pytest.approx(1, abs=1e-5)
+    assert got[-1] == pytest.approx(1 / (1 - nu**2), rel=2e-3)
+    assert np.all(np.diff(got) > 0)
+    for width, factor in zip(widths[1:4], got[1:4], strict=True):
+        n = 801
+        step = width / (n - 1)
+        second = (np.eye(n, k=1) - 2 * np.eye(n) + np.eye(n, k=-1))[1:-1] / step**2
+        weight = np.full(n, step)
+        weight[[0, -1]] = step / 2
+        inner = weight[1:-1, None]
+        # twice the energy over D, with k = 1: u_yy^2 + 2 nu u_yy + 12 (1 - nu^2) (u / (R t))^2
+        bed = np.diag(weight) * 12 * (1 - nu**2) / (radius * thickness) ** 2
+        u = np.linalg.solve(second.T @ (inner * second) + bed, -nu * (second.T @ inner)[:, 0])
+        moment = width + nu * (inner[:, 0] @ (second @ u))
+        assert factor == pytest.approx(moment / width / (1 - nu**2), rel=1e-3)
+
+
+def test_the_series_of_a_narrow_strip_meets_the_closed_form():
+    nu, thickness, curvature = 0.3, 1e-3, 10.0
+    width = 0.1 / (3 * (1 - nu**2)) ** 0.25 / np.sqrt(curvature / thickness)
+    below, above = (wide_strip_factor(s * width, thickness, curvature, nu) for s in (0.999, 1.001))
+    assert below == pytest.approx(above, abs=1e-8)

@@ -16,7 +16,7 @@ from dftfs.spring.rod import arm_rod
 
 def stiffness(design) -> float:
     elastic = design.material.youngs_modulus_Pa, design.material.poisson_ratio
-    arm = arm_rod(build_outline(design.spiral), design.width_m, *elastic)
+    arm = arm_rod(build_outline(design.spiral), design.width_m, *elastic, wide=True)
     return design.n_arms * twist_stiffness(arm.rod)
 
 

@@ -2,6 +2,7 @@
 
 import csv
 import io
+from dataclasses import replace
 
 import pytest
 
@@ -38,7 +39,8 @@ def filled(sheet, path, **measured):
 def stiffness(**changes):
     design = load_design("al1", changes)
     elastic = design.material.youngs_modulus_Pa, design.material.poisson_ratio
-    return design.n_arms * twist_stiffness(arm_rod(design.outline, design.width_m, *elastic).rod)
+    arm = arm_rod(design.outline, design.width_m, *elastic, wide=True)
+    return design.n_arms * twist_stiffness(arm.rod)
 
 
 def test_the_dimensions_of_a_part_give_its_stiffness(sheet, tmp_path):
@@ -78,6 +80,28 @@ def test_the_bore_is_h7_and_one_below_it_is_reported(sheet, tmp_path):
     for wrong in (21.335, 21.39):
         (line,) = first_article(design, filled(sheet, path, bore=wrong)).outside
         assert line == f"bore diameter, H7 {wrong} is not 21.36 to 21.381"
+
+
+def test_a_part_is_predicted_by_the_3d_stiffness_that_its_sheet_states(tmp_path):
+    """1 mm thick, 30 mm wide: rod and plane stress are 10 % off what the sheet's 3D found."""
+    design, path, solid = load_design("al1"), tmp_path / "sheet.csv", 1.1 * stiffness()
+    free = replace(design.requirements, stiffness_Nm_per_rad=None)
+    design = replace(design, requirements=free)
+    wire = find_process("wire-edm")
+    tolerance = drawing_tolerance(design, wire, solid_Nm_per_rad=solid)
+    assert tolerance.nominal_Nm_per_rad == pytest.approx(solid, rel=1e-9)
+    plain = drawing_tolerance(design, wire)
+    assert tolerance.thickness_m == plain.thickness_m
+    assert tolerance.kept == pytest.approx(plain.kept)
+    sheet = measuring_sheet(design, tolerance, solid)
+    asked = next(row for row in csv.reader(io.StringIO(sheet)) if row[0].startswith("stiffness"))
+    assert float(asked[1]) == pytest.approx(solid, abs=1e-3)
+    found = first_article(design, filled(sheet, path, axial=7.4))
+    thick = stiffness(width_mm="7.4") / stiffness()
+    assert found.predicted_Nm_per_rad == pytest.approx(solid * thick, rel=1e-4)
+    path.write_text(path.read_text().replace(f"{solid:.5g},", "stiff,"))
+    with pytest.raises(DesignError, match="'stiff' is no stiffness"):
+        first_article(design, path)
 
 
 @pytest.mark.parametrize(

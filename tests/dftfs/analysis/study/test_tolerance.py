@@ -155,7 +155,7 @@ def test_tolerances_of_a_process_are_its_edges():
 
 def test_coils_that_touch_one_direction_only_leave_the_other_responses(monkeypatch):
     found = tolerance.contact_onset  # no further than 0.25 rad: ref touches unwinding only
-    monkeypatch.setattr(tolerance, "contact_onset", lambda *a: found(*a, limit_rad=0.25))
+    monkeypatch.setattr(tolerance, "contact_onset", lambda *a, **k: found(*a, limit_rad=0.25, **k))
     result = tolerance_study(load_design("ref"), TOLERANCES, samples=1000)
     assert result.untouched == ("contact_winding_Nm",)
     names = {spread.response for spread in result.spreads}
@@ -176,7 +176,7 @@ def test_drawing_tolerances_keep_the_stiffness_in_99_of_100_parts_by_the_rod_mod
         outline = build_outline(shifted(design.spiral, 0.0, change / 2))
         material = design.material
         elastic = design.width_m, material.youngs_modulus_Pa, material.poisson_ratio
-        rod = 2 * twist_stiffness(arm_rod(outline, *elastic).rod)
+        rod = 2 * twist_stiffness(arm_rod(outline, *elastic, wide=True).rod)
         assert np.exp(np.polyval(fit, change / t)) == pytest.approx(rod, rel=2e-4)
     parts = np.exp(np.polyval(fit, rng.uniform(-1, 1, 2000) * found.thickness_m / t))
     parts *= 1 + 0.01 * rng.standard_normal(2000)
