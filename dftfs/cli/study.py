@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     result = _record(study, {"report": report, "curve": curve})
     write_text(record, to_json(result))
     emit(result, _text(study, report), as_json=arguments.json)
-    return 1 if any(check.passed is False for check in study.checks) else 0
+    return 1 if any(check.passed is False for check in study.judged) else 0
 
 
 def _command(arguments: argparse.Namespace) -> str:
@@ -103,7 +103,7 @@ def _record(study: "StudyResult", written: dict[str, Path]) -> dict:
         "mass_kg": study.design.mass_kg,
         "actuator": {"metrics": study.actuator.metrics, "limits": study.actuator.limits},
         "structure": None if study.structure is None else study.structure.record,
-        "checks": study.checks,
+        "checks": study.judged,
         "friction_loop": None if study.friction_loop is None else study.friction_loop.record,
         "provenance": study.provenance,
         "paths": paths,
@@ -121,7 +121,7 @@ def _text(study: "StudyResult", report: Path) -> str:
     ]
     lines += [check.line() for check in study.checks]
     if study.structure is not None:
-        lines += structure_lines(study.structure)
+        lines += structure_lines(study.structure, study.design.requirements.operating_torque_Nm)
     if study.friction_loop is not None:
         lines += [check.line() for check in loop_checks(study.friction_loop)]
     return "\n".join([*lines, study.actuator.limits.sentence, f"report: {report}"])

@@ -63,8 +63,8 @@ def run(arguments: argparse.Namespace) -> int:
             on_progress=say,
         )
     error = None if arguments.no_mesh_error else stiffness_error(chosen, on_progress=say)
-    torque = design.requirements.operating_torque_Nm or _SERIES_NM
-    series = () if arguments.no_mesh_error else mesh_series(chosen, torque, on_progress=say)
+    asked = design.requirements.operating_torque_Nm
+    series = () if error is None else mesh_series(chosen, asked or _SERIES_NM, on_progress=say)
     checks = strength_checks(
         design,
         result,
@@ -86,7 +86,7 @@ def run(arguments: argparse.Namespace) -> int:
     if paths:
         write_text(paths["json"], to_json(record))
         write_text(paths["curve"], curve_csv(design, result, f"verify {arguments.design}"))
-    text = "\n".join([text_of(record), *(structure_lines(structure) if structure else ())])
+    text = "\n".join([text_of(record), *(structure_lines(structure, asked) if structure else ())])
     if paths:
         write_result(arguments, paths["page"], f"Finite elements of {design.name}", text)
     emit(record, text, as_json=arguments.json)

@@ -21,6 +21,12 @@ from dftfs.analysis.sizing.limits import (
 from dftfs.analysis.sizing.rod_candidate import Candidate, as_design
 from dftfs.analysis.sizing.task import SizingTask
 from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check, yield_check
+from dftfs.analysis.structure.stability_checks import (
+    NEARLY,
+    may_tip,
+    stability_at,
+    stability_checks,
+)
 from dftfs.analysis.sweep.run import stress_at
 from dftfs.analysis.torsion.batch_solve import SharedProblem, solve_shared
 from dftfs.analysis.torsion.result import SIGN
@@ -84,10 +90,25 @@ def confirm(
             other = _rescaled(task, found)
             if not found.kept and other.width_m != found.design.width_m:
                 found = _judge_3d(task, other, candidate, store, on_progress)
+        if found.kept:
+            found = replace(found, checks=(*found.checks, *_stays_in_plane(task, found)))
         tried.append(found)
         if found.accepted:
             break
     return tuple(tried)
+
+
+def _stays_in_plane(task: SizingTask, found: Confirmed) -> tuple[Check, ...]:
+    """Out-of-plane stability at the operating torque, its angle by the stiffness at rest."""
+    stiffness = found.stiffness_3d_Nm_per_rad
+    if stiffness is None or not may_tip(found.design):
+        return ()
+    ends = {}
+    for name, sign in SIGN.items():
+        free = found.contact_Nm[name]
+        torque = min(task.operating_torque_Nm, np.inf if free is None else NEARLY * free)
+        ends[name] = sign * torque / stiffness
+    return stability_checks(stability_at(found.design, ends), task.operating_torque_Nm)
 
 
 def _rescaled(task: SizingTask, found: Confirmed) -> SpringDesign:

@@ -11,14 +11,18 @@ from dftfs.analysis.structure.lateral import LateralState, lateral_curve
 from dftfs.analysis.structure.linear_spring import WholeSpring
 from dftfs.analysis.structure.modes import ModeSet, locked_modes, turning_modes
 from dftfs.analysis.structure.rim_stiffness import RimStiffness, rim_stiffness
+from dftfs.analysis.structure.stability_checks import (
+    NEARLY,
+    ends_at_torque_rad,
+    may_tip,
+    stability_checks,
+)
 from dftfs.analysis.torsion.problem import TorsionProblem
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.design import SpringDesign
 from dftfs.fem.linear_model import RIGID_MOTIONS
 
-_NEARLY = 0.98  # of the first contact's deflection: the last state without contact
 _UNBOUNDED_RAD = 0.5  # where stability is looked at if the coils never touch
-_FLAT = 1.0  # width over thickness below which a strip may tip over (errata S17)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +100,7 @@ def structural_result(
     """
     spring = WholeSpring(design=design, layers=layers)
     ends = {
-        name: sign * _NEARLY * abs(free.contact_onset[name].deflection_rad)
+        name: sign * NEARLY * abs(free.contact_onset[name].deflection_rad)
         if free.contact_onset.get(name)
         else sign * _UNBOUNDED_RAD
         for name, sign in SIGN.items()
@@ -106,9 +110,12 @@ def structural_result(
     on_progress("natural frequencies")
     modes = _modes(spring, load_inertia_kg_m2, hub_inertia_kg_m2)
     paths = {}
-    if always_stability or design.width_m < _FLAT * design.spiral.thickness_m:
+    if always_stability or may_tip(design):
         on_progress("out-of-plane stability")
-        paths = {name: stability(spring, [end / 2, end]) for name, end in ends.items()}
+        paths = {
+            name: stability(spring, _states_rad(design, free, name, end))
+            for name, end in ends.items()
+        }
     on_progress("lateral stiffness against angle")
     plane = TorsionProblem(design=design, dimension=2, sizing=spring.sizing)
     around = [share * end for end in ends.values() for share in (0.5, 1.0)]
@@ -121,6 +128,19 @@ def structural_result(
         inertia_kg_m2=spring.inertia_kg_m2,
         energy_J=_energy_at_contact(free),
     )
+
+
+def _states_rad(
+    design: SpringDesign, free: StiffnessResult, name: str, end_rad: float
+) -> list[float]:
+    """Half of the way to the end, the end, and the operating torque's deflection."""
+    found = {end_rad / 2, end_rad}
+    asked = design.requirements.operating_torque_Nm
+    if asked is not None:
+        at = ends_at_torque_rad(free, asked)[name]
+        if at / end_rad > 0.01 and abs(at / end_rad - 1) > 0.01:
+            found.add(at)
+    return sorted(found, key=abs)
 
 
 def _modes(spring: WholeSpring, load: float | None, hub: float | None) -> tuple[ModeSet, ...]:
@@ -143,31 +163,13 @@ def _energy_at_contact(free: StiffnessResult) -> dict[str, float]:
     return found
 
 
-def structure_checks(result: StructureResult) -> tuple[Check, ...]:
-    """Stability judged in each direction; the lowest frequencies stated."""
-    checks = []
-    for name, path in result.stability.items():
-        last = path.states[-1]
-        text = f"lowest out-of-plane frequency squared {last.lowest_per_s2:.3g} 1/s2 there"
-        if path.critical_rad is not None:
-            how = "extrapolated to" if path.extrapolated else "at"
-            text += f"; stability lost {how} {path.critical_rad:+.3f} rad"
-        checks.append(
-            Check(
-                name=f"stays in its plane, {name}",
-                value=float(max(state.unstable for state in path.states)),
-                unit="unstable modes",
-                limit=f"none up to {last.deflection_rad:+.3f} rad",
-                passed=path.stable,
-                note=text,
-                source="tangent of the deflected spring, rim and hub clamped",
-            )
-        )
-    return tuple(checks)
+def structure_checks(result: StructureResult, torque_Nm: float | None = None) -> tuple[Check, ...]:
+    """Stability judged in each direction up to a torque, to the path's end without one."""
+    return stability_checks(result.stability, torque_Nm)
 
 
-def structure_lines(result: StructureResult) -> list[str]:
-    """The figures as lines of text, for a terminal."""
+def structure_lines(result: StructureResult, torque_Nm: float | None = None) -> list[str]:
+    """The figures as lines of text, for a terminal, judged up to a torque."""
     rim = result.rim
     low, high = (value / 1e3 for value in rim.lateral_N_per_m)
     lines = [
@@ -183,4 +185,4 @@ def structure_lines(result: StructureResult) -> list[str]:
         lines.append(
             f"energy at first contact, {name}: {result.energy_J[name]:.3f} J, {share:.2f} J/kg"
         )
-    return [*lines, *(check.line() for check in structure_checks(result))]
+    return [*lines, *(check.line() for check in structure_checks(result, torque_Nm))]

@@ -20,6 +20,11 @@ from dftfs.analysis.strength.fkm import (
     fatigue_strength,
     gradients_per_mm,
 )
+from dftfs.analysis.structure.stability_checks import (
+    ends_at_torque_rad,
+    stability_at,
+    stability_checks,
+)
 from dftfs.analysis.study.drawing_tolerance import DrawingTolerance
 from dftfs.analysis.study.measuring_sheet import measuring_sheet
 from dftfs.analysis.study.run import design_hash, study_checks
@@ -35,7 +40,10 @@ _TIME = (2000, 1, 1, 0, 0, 0)  # of every entry: the same content is the same zi
 
 @dataclass(frozen=True, kw_only=True)
 class Certificate:
-    """What is stated of a part: lines (name, value), the checks, the curve behind them."""
+    """What is stated of a part: lines (name, value), the checks, the curve behind them.
+
+    The checks are a study's, and at the operating torque whether the spring stays in its plane.
+    """
 
     design: SpringDesign
     lines: tuple[tuple[str, str], ...]
@@ -74,9 +82,17 @@ def certificate(
     return Certificate(
         design=design,
         lines=tuple(lines),
-        checks=study_checks(design, result),
+        checks=(*study_checks(design, result), *_stays_in_plane(design, result)),
         curve=result,
     )
+
+
+def _stays_in_plane(design: SpringDesign, result: StiffnessResult) -> tuple[Check, ...]:
+    torque = design.requirements.operating_torque_Nm
+    if torque is None:
+        return ()
+    paths = stability_at(design, ends_at_torque_rad(result, torque))
+    return stability_checks(paths, torque)
 
 
 def _life(design: SpringDesign, result: StiffnessResult, process: Process) -> list[tuple[str, str]]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from dftfs.analysis.strength.checks import Check
 from dftfs.analysis.strength.friction_loop import FrictionLoop
-from dftfs.analysis.structure.result import StructureResult
+from dftfs.analysis.structure.result import StructureResult, structure_checks
 from dftfs.analysis.torsion.result import MeshErrorEstimate, StiffnessResult
 from dftfs.design import SpringDesign
 from dftfs.fem.mesh import TaggedMesh
@@ -55,3 +55,11 @@ class StudyResult:
     provenance: Provenance
     friction_loop: FrictionLoop | None = None
     structure: StructureResult | None = None
+
+    @property
+    def judged(self) -> tuple[Check, ...]:
+        """The requirements, and stability up to the operating torque where one is stated."""
+        torque = self.design.requirements.operating_torque_Nm
+        if self.structure is None or torque is None:
+            return self.checks
+        return (*self.checks, *structure_checks(self.structure, torque))

@@ -77,7 +77,7 @@ def render_report(study: StudyResult, folder: Path, figures: Mapping[str, Report
         "report.html",
         figures.values(),
         study=study,
-        verdict=summary.verdict(study.checks),
+        verdict=summary.verdict(study.judged),
         big_numbers=summary.big_numbers(study),
         figures=figures,
         turnable=turnable_part(study.solid, study.design.width_m),

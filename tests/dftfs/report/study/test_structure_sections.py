@@ -114,6 +114,21 @@ def test_a_spring_that_tips_over_fails_its_check_and_says_where():
     )
 
 
+def test_a_study_fails_where_its_spring_tips_below_the_operating_torque(tmp_path):
+    plain = small_study(tmp_path)
+    design, names = plain.design, ("stays in its plane, unwinding",)
+    for torque, passed in ((5.0, True), (12.5, False)):  # stability is lost at 0.18 rad, 11.9 Nm
+        needs = replace(design.requirements, operating_torque_Nm=torque)
+        study = replace(
+            plain,
+            design=replace(design, requirements=needs),
+            structure=made_structure(unstable=1),
+        )
+        found = {c.name: c.passed for c in study.judged if c not in plain.checks}
+        assert found == dict.fromkeys(names, passed)
+    assert plain.judged == plain.checks
+
+
 def test_records_are_plain_data():
     record = as_plain(made_structure().record)
     assert record["rim_stiffness"]["order"] == ["x", "y", "z", "rx", "ry", "rz"]
