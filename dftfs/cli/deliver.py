@@ -68,7 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
     folder = prepared(arguments, arguments.out or Path("out") / f"deliver-{design.name}")
     target = folder / f"{design.name}-{arguments.revision}.zip"
     refuse_existing([target], force=arguments.force)
-    result, plane = solved_for_delivery(design, say)
+    result, plane, bars = solved_for_delivery(design, say)
     tolerance = drawing_tolerance(
         design,
         process,
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
         solid_Nm_per_rad=result.stiffness_Nm_per_rad,
     )
     say(tolerance.line())
-    found = certificate(design, result, plane, process, tolerance)
+    found = certificate(design, result, process, tolerance, plane_Nm_per_rad=plane, bars=bars)
     shop = ShopData(
         part_number=arguments.part,
         revision=arguments.revision,

@@ -182,12 +182,13 @@ def judge_2d(
         stiffness_3d_Nm_per_rad=stiffness_3d_Nm_per_rad,
         checks=(
             *stiffness_check(needs, judged, model),
-            *contact_checks(needs, contact, reached),
+            *contact_checks(needs, contact, reached, curve["model"]),
             *yield_check(
                 needs,
                 stress_per_torque={direction: value / asked for direction, value in worst.items()},
                 yield_strength_Pa=design.material.yield_strength_Pa,
                 no_strengths=design.material.no_strengths,
+                model=curve["model"],
             ),
             *_life_check(task, design, max(worst.values())),
             *_other_checks(task, design, contact),

@@ -4,10 +4,14 @@ After Capytaine's pre-flight checks: the computed number, the threshold and what
 module of their own.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 
 from dftfs.design import Requirements
 from dftfs.material import Material
+
+_SAME = 1e-3  # of a torque: a curve that ends so little short of it reaches it
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,11 +67,12 @@ def contact_checks(
     requirements: Requirements,
     onset_Nm: dict[str, float | None],
     reached_Nm: dict[str, float],
+    model: str,
 ) -> list[Check]:
     """No coil may touch below the required torque, in either direction.
 
     ``onset_Nm`` is the magnitude of the torque at first contact per direction, None where the
-    curve ended before one; ``reached_Nm`` the largest magnitude that was computed.
+    curve ended before one; ``reached_Nm`` the largest magnitude that was computed by ``model``.
     """
     asked = requirements.contact_free_torque_Nm
     if asked is None:
@@ -84,6 +89,7 @@ def contact_checks(
                 limit=f"at least {asked:g} Nm",
                 passed=passed,
                 note="" if onset is not None else f"no contact up to {reached:.3g} Nm",
+                source=model,
             )
         )
     return checks
@@ -95,13 +101,27 @@ def yield_check(
     stress_per_torque: dict[str, float],
     yield_strength_Pa: float | None,
     no_strengths: str,
+    model: str,
+    bar: float = 0.0,
+    reached_Nm: Mapping[str, float] | None = None,
     material: Material | None = None,
 ) -> list[Check]:
     """Safety factor to first yield at the operating torque, the worse of both directions.
 
-    ``stress_per_torque`` is the peak von Mises stress over the torque (Pa/Nm) at that torque. Of a
-    ``material`` the note says whether its strength is typical or guaranteed, and the factor that
-    the guaranteed one leaves; the verdict is by the strength given.
+    It passes if the stress with its error bar does; what is extrapolated beyond the curve may fail
+    but is open otherwise.
+
+    Parameters
+    ----------
+    stress_per_torque : mapping of direction to float
+        Peak von Mises stress over the torque (Pa/Nm) at that torque, by ``model``.
+    bar : float
+        Relative error bar of the stress by its mesh series; infinite where it has no limit.
+    reached_Nm : mapping of direction to float, optional
+        The largest torque that was computed.
+    material : Material, optional
+        The note says whether its strength is typical or guaranteed, and the factor that the
+        guaranteed one leaves; the verdict is by the strength given.
     """
     torque = requirements.operating_torque_Nm
     if torque is None:
@@ -116,20 +136,35 @@ def yield_check(
                 limit=limit,
                 passed=None,
                 note=f"the material has no strengths: {no_strengths}",
+                source=model,
             )
         ]
     direction = max(stress_per_torque, key=lambda key: stress_per_torque[key])
     stress = stress_per_torque[direction] * torque
     factor = yield_strength_Pa / stress
-    note = f"{stress / 1e6:.0f} MPa {direction} against {yield_strength_Pa / 1e6:.0f} MPa"
+    least, last = requirements.min_safety_factor_yield, (reached_Nm or {}).get(direction, torque)
+    found = f"{stress / 1e6:.0f}" + (f" +- {bar * stress / 1e6:.2g}" if 0 < bar < inf else "")
+    note = f"{found} MPa {direction} against {yield_strength_Pa / 1e6:.0f} MPa"
     basis = "" if material is None else material.strength_note(stress)
+    finite, doubt = bar if bar < inf else 0.0, _doubt(bar, torque, last)
+    kept = factor >= least * (1 + finite)
     return [
         Check(
             name="safety factor to yield",
             value=factor,
             unit="",
             limit=limit,
-            passed=factor >= requirements.min_safety_factor_yield,
-            note=f"{note}; {basis}" if basis else note,
+            passed=None if kept and doubt else kept,
+            note=(f"{note}; {basis}" if basis else note) + doubt,
+            source=model,
         )
     ]
+
+
+def _doubt(bar: float, torque_Nm: float, last_Nm: float) -> str:
+    """Why a stress at a torque cannot pass: no limit by the meshes, or beyond the last torque."""
+    if bar == inf:
+        return "; grows with every finer mesh"
+    if last_Nm < torque_Nm * (1 - _SAME):
+        return f"; extrapolated in proportion from {last_Nm:.3g} Nm"
+    return ""

@@ -115,7 +115,7 @@ def _checks(design: SpringDesign, rod: RodCurve, touches: Mapping) -> tuple[Chec
     ends = {WINDING: float(np.max(rod.torque_Nm)), UNWINDING: float(-np.min(rod.torque_Nm))}
     return (
         *stiffness_check(asked, rod.stiffness_Nm_per_rad, "rod model"),
-        *contact_checks(asked, onset_Nm, ends),
+        *contact_checks(asked, onset_Nm, ends, "rod model"),
         _neck_check(design),
     )
 

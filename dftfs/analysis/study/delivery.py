@@ -8,6 +8,7 @@ the operating torque either way, fully reversed.
 import io
 import tempfile
 import zipfile
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,7 +28,7 @@ from dftfs.analysis.structure.stability_checks import (
 )
 from dftfs.analysis.study.drawing_tolerance import DrawingTolerance
 from dftfs.analysis.study.measuring_sheet import measuring_sheet
-from dftfs.analysis.study.run import design_hash, study_checks
+from dftfs.analysis.study.run import bars_of_stress, beyond_for, design_hash, study_checks
 from dftfs.analysis.torsion.curve_file import curve_csv
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.cad.drawing_sheet import Sheet, ShopData
@@ -35,6 +36,7 @@ from dftfs.design import SpringDesign, design_toml
 from dftfs.errors import DesignError
 from dftfs.process import Process
 
+_STATES_BEYOND = 3  # from the first contact to the operating torque
 _TIME = (2000, 1, 1, 0, 0, 0)  # of every entry: the same content is the same zip
 
 
@@ -54,9 +56,11 @@ class Certificate:
 def certificate(
     design: SpringDesign,
     result: StiffnessResult,
-    plane_Nm_per_rad: float,
     process: Process,
     tolerance: DrawingTolerance,
+    *,
+    plane_Nm_per_rad: float,
+    bars: Mapping[str, float],
 ) -> Certificate:
     """Stiffness, first contact, stress, life and mass of a design, with their models."""
     lines = [
@@ -72,17 +76,16 @@ def certificate(
         ("by the drawing's tolerances", tolerance.line()),
     ]
     for direction, onset in result.contact_onset.items():
-        touch = (
-            "no contact of coils"
-            if onset is None
-            else (f"{abs(onset.torque_Nm):.2f} Nm at {abs(onset.deflection_rad):.4f} rad")
-        )
+        state = result.snapshots[direction] if onset is None else onset
+        touch = f"{abs(state.torque_Nm):.2f} Nm at {abs(state.deflection_rad):.4f} rad"
+        if onset is None:  # nobody looked further
+            touch = f"none up to {touch}"
         lines.append((f"first contact, {direction}", touch))
     lines += _life(design, result, process)
     return Certificate(
         design=design,
         lines=tuple(lines),
-        checks=(*study_checks(design, result), *_stays_in_plane(design, result)),
+        checks=(*study_checks(design, result, bars), *_stays_in_plane(design, result)),
         curve=result,
     )
 
@@ -100,7 +103,7 @@ def _life(design: SpringDesign, result: StiffnessResult, process: Process) -> li
     if torque is None:
         return []
     stress = max(result.stress_at_torque_Pa(sign * torque) for sign in SIGN.values())
-    lines = [(f"largest stress at {torque:g} Nm", f"{stress / 1e6:.0f} MPa")]
+    lines = [(f"largest stress at {torque:g} Nm, {result.model}", f"{stress / 1e6:.0f} MPa")]
     strength = design.material.yield_strength_Pa
     if strength is not None and stress > strength:
         return [*lines, ("life", "none stated: the notch yields at the operating torque")]
@@ -123,8 +126,10 @@ def _life(design: SpringDesign, result: StiffnessResult, process: Process) -> li
 
 def solved_for_delivery(
     design: SpringDesign, on_progress=lambda message: None
-) -> tuple[StiffnessResult, float]:
-    """The 3D curve both ways to first contact, and the plane-stress stiffness at rest.
+) -> tuple[StiffnessResult, float, dict[str, float]]:
+    """The 3D curve both ways to first contact or, with contact, to the operating torque.
+
+    Beside it the plane-stress stiffness at rest, and the error bars of the stress.
 
     Raises
     ------
@@ -134,17 +139,18 @@ def solved_for_delivery(
     from dftfs.analysis.torsion.problem import meshed_problem
     from dftfs.analysis.torsion.solve import solve_torsion
 
-    plane = solve_torsion(
-        meshed_problem(design, dimension=2), states_per_direction=6, on_progress=on_progress
-    )
+    planar = meshed_problem(design, dimension=2)
+    plane = solve_torsion(planar, states_per_direction=6, on_progress=on_progress)
     near = {name: abs(shot.deflection_rad) for name, shot in plane.snapshots.items()}
     result = solve_torsion(
         meshed_problem(design, dimension=3),
         states_per_direction=6,
         expected_onset_rad=near,
+        beyond=beyond_for(plane, design.requirements.operating_torque_Nm, 1.0),
+        states_beyond=_STATES_BEYOND,
         on_progress=on_progress,
     )
-    return result, plane.stiffness_Nm_per_rad
+    return result, plane.stiffness_Nm_per_rad, bars_of_stress(planar, plane, on_progress)
 
 
 def packed(files: dict[str, bytes]) -> bytes:

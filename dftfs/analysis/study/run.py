@@ -3,7 +3,7 @@
 import hashlib
 import multiprocessing
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -17,7 +17,9 @@ from platform import python_version
 from dftfs import __version__
 from dftfs.analysis.jobs.worker_pool import METHOD, follow_parent
 from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check, yield_check
-from dftfs.analysis.strength.friction_loop import friction_loop
+from dftfs.analysis.strength.friction_loop import FrictionLoop, friction_loop
+from dftfs.analysis.strength.mesh_series import stress_bars
+from dftfs.analysis.strength.yield_and_set import STRUCTURAL
 from dftfs.analysis.structure.lateral import softest_lateral_stiffness
 from dftfs.analysis.structure.result import StructureResult, structural_result
 from dftfs.analysis.study.actuator import Scenario, run_with_spring
@@ -26,7 +28,7 @@ from dftfs.analysis.study.result import Provenance, StudyResult
 from dftfs.analysis.torsion.mesh_error import stiffness_error
 from dftfs.analysis.torsion.problem import TorsionProblem, meshed_problem
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
-from dftfs.analysis.torsion.solve import solve_torsion
+from dftfs.analysis.torsion.solve import LARGEST_BEYOND, solve_torsion
 from dftfs.cad.export import export_design
 from dftfs.cad.mesh import tessellate
 from dftfs.design import MeshChoice, SpringDesign
@@ -36,6 +38,8 @@ from dftfs.files import to_json
 _PACKAGES = ("numpy", "scipy", "numba", "scikit-fem", "gmsh", "cadquery", "pypardiso")
 _RENDER_TOLERANCE_MM = 0.05
 _STATES_BEYOND = 3
+_REACHES = 1.02  # of the deflection at which a torque past the contact is reached at the latest
+_FREE = 0.9  # of the first contact's torque: where the mesh series of the stress is compared
 _BEYOND = 1.3  # of the first contact's deflection: as far as the knees are shown
 
 
@@ -95,18 +99,18 @@ def run_study(
     planar, solid, structure = _finite_elements(planar_problem, solid_problem, options, stage)
     with stage("mesh series"):
         error = stiffness_error(solid_problem, on_progress=on_progress)
+        bars = bars_of_stress(planar_problem, planar, on_progress)
     with stage("lateral stiffness"):
         lateral = softest_lateral_stiffness(planar_problem)
-    loop, mu = None, options.contact_friction
-    if mu is not None:
+    loop = None
+    if options.contact_friction is not None:
         with stage("friction loop, plane stress"):
-            end = options.loop_end(planar)
-            loop = friction_loop(planar_problem, planar, mu, end, on_progress=on_progress)
+            loop = _loop(planar_problem, planar, options, on_progress)
     with stage("actuator with this spring"):
         actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
     return StudyResult(
         design=design,
-        checks=study_checks(design, solid),
+        checks=study_checks(design, solid, bars),
         closed_forms=simple.closed_forms,
         eq_2_1_Nm_per_rad=simple.eq_2_1_Nm_per_rad,
         rod=simple.rod,
@@ -125,6 +129,13 @@ def run_study(
         friction_loop=loop,
         structure=structure,
     )
+
+
+def _loop(
+    problem: TorsionProblem, free: StiffnessResult, options: StudyOptions, say: Callable
+) -> FrictionLoop:
+    end = options.loop_end(free)
+    return friction_loop(problem, free, options.contact_friction, end, on_progress=say)
 
 
 class _Stages:
@@ -164,6 +175,8 @@ def _finite_elements(
         stage("3D finite elements, both directions, past first contact"),
     ):
         last = {name: abs(snap.deflection_rad) for name, snap in planar.snapshots.items()}
+        asked = planar_problem.design.requirements.operating_torque_Nm
+        past["beyond"] = beyond_for(planar, asked, _BEYOND)
         solid = solve_torsion(solid_problem, expected_onset_rad=last, **past)
     with stage("six directions, vibration, stability: time left to wait"):
         structure = structural()
@@ -192,8 +205,33 @@ def _in_another_process(task: Callable[[], StructureResult]) -> Iterator[Callabl
         yield result
 
 
-def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, ...]:
-    """The design's requirements judged on the 3D result."""
+def beyond_for(free: StiffnessResult, torque_Nm: float | None, least: float) -> float:
+    """How far a curve must go, over its first contact, to reach a torque past the contact.
+
+    ``free`` knows the first contacts. Coils in contact are stiffer, so that the torque is reached
+    before the proportional deflection; at least ``least``, at most what a curve may have.
+    """
+    touches = [abs(touch.torque_Nm) for touch in free.contact_onset.values() if touch]
+    needed = [_REACHES * (torque_Nm or 0.0) / touch for touch in touches]
+    return min(LARGEST_BEYOND, max([least, *needed]))
+
+
+def bars_of_stress(
+    planar: TorsionProblem, free: StiffnessResult, say: Callable[[str], None]
+) -> dict[str, float]:
+    """Error bars of the stress for the check against yield; none where nothing is judged."""
+    design = planar.design
+    torque = design.requirements.operating_torque_Nm
+    if torque is None or design.material.yield_strength_Pa is None:
+        return {}
+    touches = [abs(touch.torque_Nm) for touch in free.contact_onset.values() if touch]
+    return stress_bars(planar, min([torque, *(_FREE * each for each in touches)]), on_progress=say)
+
+
+def study_checks(
+    design: SpringDesign, solid: StiffnessResult, bars: Mapping[str, float] | None = None
+) -> tuple[Check, ...]:
+    """The design's requirements judged on the 3D result, stress with the bars of its regions."""
     asked, material = design.requirements, design.material
     onsets = {
         name: None if onset is None else abs(onset.torque_Nm)
@@ -204,17 +242,27 @@ def study_checks(design: SpringDesign, solid: StiffnessResult) -> tuple[Check, .
     stress = {
         name: solid.stress_at_torque_Pa(sign * torque) / torque for name, sign in SIGN.items()
     }
+    worst = max(STRUCTURAL, key=lambda region: _largest_Pa(solid, torque, region))
     return (
         *stiffness_check(asked, solid.stiffness_Nm_per_rad, solid.model),
-        *contact_checks(asked, onsets, reached),
+        *contact_checks(asked, onsets, reached, solid.model),
         *yield_check(
             asked,
             stress_per_torque=stress,
             yield_strength_Pa=material.yield_strength_Pa,
             no_strengths=material.no_strengths,
+            model=solid.model,
+            bar=(bars or {}).get(worst, 0.0),
+            reached_Nm=solid.reached_Nm(),
             material=material,
         ),
     )
+
+
+def _largest_Pa(solid: StiffnessResult, torque_Nm: float, region: str) -> float:
+    if region not in solid.regional_peak_Pa:
+        return 0.0
+    return max(solid.stress_at_torque_Pa(sign * torque_Nm, region) for sign in SIGN.values())
 
 
 def design_hash(design: SpringDesign) -> str:

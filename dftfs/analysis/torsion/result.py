@@ -132,6 +132,10 @@ class StiffnessResult:
         if np.any(np.diff(self.deflection_rad) <= 0):
             raise DesignError("a stiffness curve must be sorted by deflection, without repeats")
 
+    def reached_Nm(self) -> dict[str, float]:
+        """The largest torque (magnitude) that was computed in each direction."""
+        return {name: float(np.max(sign * self.torque_Nm)) for name, sign in SIGN.items()}
+
     def secant_Nm_per_rad(self, deflection_rad: float) -> float:
         """Torque over deflection at a deflection inside the curve."""
         return self.torque_at_Nm(deflection_rad) / deflection_rad
