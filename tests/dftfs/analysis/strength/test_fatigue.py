@@ -13,6 +13,7 @@ from dftfs.analysis.strength.fatigue import (
     damage,
     goodman_amplitude_Pa,
     sn_line,
+    static_share,
     swt_amplitude_Pa,
 )
 from dftfs.errors import DesignError
@@ -20,16 +21,31 @@ from dftfs.errors import DesignError
 
 def line():
     return sn_line(
-        ultimate_Pa=500e6, fatigue_Pa=100e6, fatigue_cycles=5e8, stress_ratio=-1.0, factor=0.8
+        ultimate_Pa=400e6, fatigue_Pa=100e6, fatigue_cycles=5e8, stress_ratio=-1.0, factor=0.8
     )
 
 
 def test_line_runs_through_its_two_points_and_miner_adds_up():
     found = line()
-    assert found.cycles(0.9 * 500e6) == pytest.approx(1e3)
+    assert found.cycles(0.9 * 400e6) == pytest.approx(1e3)
     assert found.cycles(80e6) == pytest.approx(5e8)
-    assert damage([80e6, 450e6], [5e7, 100], found) == pytest.approx(0.1 + 0.1)
+    assert damage([80e6, 360e6], [5e7, 100], found) == pytest.approx(0.1 + 0.1)
     assert damage([0.0], [1e9], found) == 0.0
+
+
+def test_a_strong_alloy_keeps_less_than_nine_tenths_at_a_thousand_cycles():
+    """Shigley, 9th ed., example 6-2: 90 kpsi, f = 0.86 by Fig. 6-18; 200 kpsi is its end, 0.77."""
+    kpsi = 6.894757e6
+    assert static_share(90 * kpsi) == pytest.approx(0.86, abs=0.005)
+    assert static_share(200 * kpsi) == pytest.approx(0.77, abs=0.005)
+    # by hand: Su 900, sF 1245, Se' 450 MPa; b = -lg(2.7667) / lg(2e6) = -0.07014
+    assert static_share(900e6) == pytest.approx(1245 / 900 * 2000**-0.07014, rel=1e-4)
+    assert static_share(60 * kpsi) == 0.9
+    weaker = sn_line(
+        ultimate_Pa=900e6, fatigue_Pa=300e6, fatigue_cycles=1e7, stress_ratio=-1.0, factor=1.0
+    )
+    assert weaker.amplitude_Pa(1e3) == pytest.approx(730.5e6, rel=1e-3)
+    assert weaker.amplitude_Pa(1e7) == pytest.approx(300e6)
 
 
 def test_mean_stress_rules_agree_fully_reversed_and_differ_in_pulsating_load():
