@@ -1,4 +1,4 @@
-"""Cauchy and von Mises stress from displacements.
+"""Cauchy, von Mises and principal stress from displacements.
 
 In every element the components are fitted in its own shape functions to the 3 x 3 (x 3)
 integration points by least squares; the nodal value is the mean over the elements of each one's
@@ -33,14 +33,17 @@ class StressField:
         At the nodes: mean over the elements of their extrapolated values.
     point_von_mises_Pa : (m, q) array
         At the 3 x 3 (x 3) integration points.
+    principal_Pa : (n,) array
+        Largest principal stress by magnitude at the nodes, without its sign; as ``von_mises_Pa``.
     """
 
     von_mises_Pa: NDArray[np.float64]
     point_von_mises_Pa: NDArray[np.float64]
+    principal_Pa: NDArray[np.float64]
 
 
 def recover_stress(problem: StaticProblem, displacement_m: NDArray[np.float64]) -> StressField:
-    """Von Mises stresses at nodes and integration points.
+    """Von Mises and principal stresses at nodes, von Mises stresses at integration points.
 
     Nodes on the two sides of a cyclic cut share their elements' values.
 
@@ -52,15 +55,20 @@ def recover_stress(problem: StaticProblem, displacement_m: NDArray[np.float64]) 
     mesh = problem.mesh
     stress = cauchy_stress(problem, displacement_m)
     fit = np.linalg.pinv(gauss_table(mesh.kind.name, 3).values)
-    local = von_mises(np.einsum("aq,eqij->eaij", fit, stress, optimize=True))
+    tensors = np.einsum("aq,eqij->eaij", fit, stress, optimize=True)
     owner = np.arange(len(mesh.nodes))
     if problem.cyclic is not None:
         owner[problem.cyclic.slave_nodes] = problem.cyclic.master_nodes
     nodes = owner[mesh.cells]
-    total = np.bincount(nodes.ravel(), local.ravel(), minlength=len(owner))
     count = np.bincount(nodes.ravel(), minlength=len(owner))
+
+    def mean(local: NDArray[np.float64]) -> NDArray[np.float64]:
+        total = np.bincount(nodes.ravel(), local.ravel(), minlength=len(owner))
+        return _frozen(total[owner] / count[owner])
+
     return StressField(
-        von_mises_Pa=_frozen(total[owner] / count[owner]),
+        von_mises_Pa=mean(von_mises(tensors)),
+        principal_Pa=mean(np.abs(np.linalg.eigvalsh(tensors)).max(axis=-1)),
         point_von_mises_Pa=_frozen(von_mises(stress)),
     )
 

@@ -116,7 +116,10 @@ def goodman_amplitude_Pa(low_Pa: float, high_Pa: float, ultimate_Pa: float) -> f
 
 
 def swt_amplitude_Pa(low_Pa: float, high_Pa: float) -> float:
-    """Smith, Watson and Topper: sqrt(largest x amplitude), 0 where nothing is in tension."""
+    """Smith, Watson and Topper: sqrt(largest x amplitude) of the principal stress.
+
+    0 where nothing is in tension.
+    """
     return sqrt(max(high_Pa, 0.0) * (high_Pa - low_Pa) / 2)
 
 

@@ -101,7 +101,8 @@ def fatigue_lives(
     """Damage of notch, slit and arm under blocks of torque.
 
     At a place the stress turns its sign with the torque. Some edge of a region is in tension in
-    either direction: both signs are tried and the worse is kept.
+    either direction: both signs are tried and the worse is kept. Goodman's rule takes von Mises
+    stress, that of Smith, Watson & Topper the principal stress for which it was written.
 
     Raises
     ------
@@ -140,16 +141,21 @@ def _life(
     worst: tuple[float, list] = (-1.0, [])
     swt = 0.0
     for sign in (+1, -1):
-        ends = [
-            sorted(
-                sign * np.sign(torque) * result.stress_at_torque_Pa(torque, region)
-                for torque in (block.low_Nm, block.high_Nm)
-            )
-            for block in spectrum
-        ]
+        ends, tensile = (
+            [
+                sorted(
+                    sign
+                    * np.sign(torque)
+                    * result.stress_at_torque_Pa(torque, region, principal=principal)
+                    for torque in (block.low_Nm, block.high_Nm)
+                )
+                for block in spectrum
+            ]
+            for principal in (False, True)
+        )
         amplitudes = [goodman_amplitude_Pa(*end, ultimate) for end in ends]
         worst = max(worst, (float(damage(amplitudes, cycles, line)), ends), key=lambda w: w[0])
-        swt = max(swt, float(damage([swt_amplitude_Pa(*end) for end in ends], cycles, line)))
+        swt = max(swt, float(damage([swt_amplitude_Pa(*end) for end in tensile], cycles, line)))
     return FatigueLife(
         region=region,
         goodman_damage=worst[0],

@@ -23,7 +23,10 @@ _GOODMAN = (
     "S-N line with FKM's roughness and notch support, Shigley's reliability; Goodman mean stress"
     " (Shigley 6-46); Miner's rule to FKM's allowed sum"
 )
-_SWT = "Smith, Watson & Topper 1970 on the same S-N line; Miner's rule to FKM's allowed sum"
+_SWT = (
+    "Smith, Watson & Topper 1970, principal stress, on the same S-N line; Miner's rule to FKM's"
+    " allowed sum"
+)
 
 
 def strength_checks(

@@ -56,16 +56,16 @@ def contact_mask(problem: TorsionProblem, touch: Touch | None) -> NDArray[np.boo
 
 
 def regional_peaks_Pa(
-    problem: TorsionProblem, von_mises_Pa: NDArray[np.float64], touch: Touch | None
+    problem: TorsionProblem, nodal_Pa: NDArray[np.float64], touch: Touch | None
 ) -> dict[str, float]:
-    """Largest nodal von Mises stress per region; that of the contact is not counted elsewhere.
+    """Largest nodal stress (von Mises or principal) per region.
 
-    0 for the contact where nothing touches.
+    That of the contact is not counted elsewhere; 0 for the contact where nothing touches.
     """
     pressed = contact_mask(problem, touch)
     peaks = {
-        region: float(np.max(von_mises_Pa[mask & ~pressed], initial=0.0))
+        region: float(np.max(nodal_Pa[mask & ~pressed], initial=0.0))
         for region, mask in region_masks(problem).items()
     }
-    peaks[CONTACT] = float(np.max(von_mises_Pa[pressed], initial=0.0))
+    peaks[CONTACT] = float(np.max(nodal_Pa[pressed], initial=0.0))
     return peaks

@@ -104,6 +104,8 @@ class StiffnessResult:
     contact_onset : mapping of direction to `ContactOnset` or None
     regional_peak_Pa : mapping of region (`regions.REGIONS`) to (n,)
         Peak von Mises stress there; empty where it was not split.
+    regional_principal_Pa : mapping of region to (n,)
+        Largest principal stress by magnitude there, without its sign.
     fields : StepFields or None
         One row a state.
     """
@@ -123,6 +125,7 @@ class StiffnessResult:
     wall_s: float
     regional_peak_Pa: Mapping[str, NDArray] = field(default_factory=dict)
     fields: StepFields | None = None
+    regional_principal_Pa: Mapping[str, NDArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for entry in fields(self):
@@ -158,15 +161,18 @@ class StiffnessResult:
             hermite(deflection_rad, self.deflection_rad, self.torque_Nm, self.tangent_Nm_per_rad)
         )
 
-    def stress_at_torque_Pa(self, torque_Nm: float, region: str | None = None) -> float:
+    def stress_at_torque_Pa(
+        self, torque_Nm: float, region: str | None = None, *, principal: bool = False
+    ) -> float:
         """Peak von Mises stress at a torque, linear between states and beyond the last one.
 
-        Of the whole body or of one region.
+        Of the whole body or of one region; of a region also the largest ``principal`` stress.
         """
         if torque_Nm == 0:
             return 0.0
         side = self.torque_Nm * np.sign(torque_Nm) > 0
-        peaks = self.peak_von_mises_Pa if region is None else self.regional_peak_Pa[region]
+        regional = self.regional_principal_Pa if principal else self.regional_peak_Pa
+        peaks = self.peak_von_mises_Pa if region is None else regional[region]
         torque, stress = np.abs(self.torque_Nm[side]), peaks[side]
         order = np.argsort(torque)
         ratio = np.interp(abs(torque_Nm), torque[order], (stress / torque)[order])

@@ -124,10 +124,10 @@ def _assemble(
     states = [*unwind.states[::-1], wind.rest, *wind.states]
     gaps = [*unwind.clearance_m[::-1], wind.rest_clearance_m, *wind.clearance_m]
     stresses = [recover_stress(problem.static_problem(), s.displacement_m) for s in states]
-    peaks = [
-        regional_peaks_Pa(problem, stress.von_mises_Pa, state.touch)
-        for state, stress in zip(states, stresses)
-    ]
+    peaks, principal = (
+        [regional_peaks_Pa(problem, values, s.touch) for values, s in zip(kind, states)]
+        for kind in zip(*((stress.von_mises_Pa, stress.principal_Pa) for stress in stresses))
+    )
     copies, mesh = problem.copies, problem.mesh
     snapshots = {
         direction: _snapshot(problem, path.states[path.touch]) for direction, path in paths.items()
@@ -159,6 +159,7 @@ def _assemble(
         snapshots=snapshots,
         wall_s=wall_s,
         regional_peak_Pa={r: np.array([peak[r] for peak in peaks]) for r in REGIONS},
+        regional_principal_Pa={r: np.array([peak[r] for peak in principal]) for r in REGIONS},
         fields=_fields(problem, states, [stress.von_mises_Pa for stress in stresses]),
     )
 
