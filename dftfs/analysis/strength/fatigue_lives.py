@@ -15,6 +15,7 @@ from dftfs.analysis.strength.fatigue import (
 )
 from dftfs.analysis.strength.fkm import (
     SURVIVAL,
+    FatigueStrength,
     fatigue_strength,
     gradients_per_mm,
     support_over_specimen,
@@ -58,6 +59,7 @@ class FatigueLife:
     endurance_Pa: float
     points: tuple[HaighPoint, ...]
     note: str
+    strength: FatigueStrength
 
 
 def rated_line(
@@ -171,4 +173,5 @@ def _life(
             for (low, high), n in zip(worst[1], cycles)
         ),
         note=strength.note,
+        strength=strength,
     )

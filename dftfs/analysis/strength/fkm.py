@@ -22,6 +22,7 @@ from dftfs.material import Material
 
 ALLOWED_DAMAGE = 0.3
 SURVIVAL = 0.99
+SHORTEST_LIFE = 1e3  # cycles
 _DEVIATION = 0.08
 _SMOOTHEST_UM = 1.0  # Rz up to which a surface leaves the whole strength
 _SPECIMEN_GRADIENT_PER_MM = 2 / 7.62  # R. R. Moore's rotating beam, 0.30 in
@@ -99,6 +100,20 @@ class FatigueStrength:
     stress_ratio: float
     measured: bool
     note: str
+
+
+def life_text(cycles: float, strength: FatigueStrength) -> str:
+    """A life in words: a number only where the S-N line's data lie, 1e3 cycles to the strength's.
+
+    Below 1e3 cycles strain decides, not the elastic stress; beyond the strength's own number of
+    cycles nothing was tested.
+    """
+    if cycles < SHORTEST_LIFE:
+        return f"below {SHORTEST_LIFE:.0e} cycles (outside the S-N line)".replace("e+03", "e3")
+    if cycles > strength.cycles:
+        what = "tests" if strength.measured else "estimate"
+        return f"beyond {strength.cycles:.2g} cycles (outside the {what})"
+    return f"{cycles:.2g} cycles"
 
 
 def fatigue_strength(material: Material) -> FatigueStrength:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dftfs.analysis.strength.checks import Check
 from dftfs.analysis.strength.fatigue import LoadBlock
 from dftfs.analysis.strength.fatigue_lives import FatigueLife, fatigue_lives
-from dftfs.analysis.strength.fkm import ALLOWED_DAMAGE, SURFACES, SURVIVAL
+from dftfs.analysis.strength.fkm import ALLOWED_DAMAGE, SURFACES, SURVIVAL, life_text
 from dftfs.analysis.strength.presetting import presetting
 from dftfs.analysis.strength.yield_and_set import (
     STRUCTURAL,
@@ -105,7 +105,7 @@ def _fatigue_lines(lives: Sequence[FatigueLife], surface: str, survival: float) 
     for life in lives:
         rules = (("Goodman", life.goodman_damage, _GOODMAN), ("SWT", life.swt_damage, _SWT))
         for rule, value, source in rules:
-            margin = f"the spectrum {1 / value:.3g} times to failure" if value > 0 else "no damage"
+            margin = _margin(life, value)
             note = (
                 f"{margin}; up to {life.largest_Pa / 1e6:.0f} MPa, {life.allowed_Pa / 1e6:.0f} MPa"
                 f" fully reversed allowed; {surface}{f' ({layer})' if layer else ''}, notch and"
@@ -123,6 +123,17 @@ def _fatigue_lines(lives: Sequence[FatigueLife], surface: str, survival: float) 
                 )
             )
     return lines
+
+
+def _margin(life: FatigueLife, damage: float) -> str:
+    """How often the spectrum until failure; where that is outside the data, so it says."""
+    if damage <= 0:
+        return "no damage"
+    total = sum(point.cycles for point in life.points)
+    words = life_text(total / damage, life.strength)
+    if words.startswith(("below", "beyond")):
+        return f"{words} to failure"
+    return f"the spectrum {1 / damage:.3g} times to failure"
 
 
 def _set_line(found: PermanentSet) -> Check:

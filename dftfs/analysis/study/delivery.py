@@ -20,6 +20,7 @@ from dftfs.analysis.strength.fkm import (
     SURVIVAL,
     fatigue_strength,
     gradients_per_mm,
+    life_text,
 )
 from dftfs.analysis.structure.stability_checks import (
     ends_at_torque_rad,
@@ -104,14 +105,14 @@ def _life(design: SpringDesign, result: StiffnessResult, process: Process) -> li
         return []
     stress = max(result.stress_at_torque_Pa(sign * torque) for sign in SIGN.values())
     lines = [(f"largest stress at {torque:g} Nm, {result.model}", f"{stress / 1e6:.0f} MPa")]
-    strength = design.material.yield_strength_Pa
-    if strength is not None and stress > strength:
+    yields = design.material.yield_strength_Pa
+    if yields is not None and stress > yields:
         return [*lines, ("life", "none stated: the notch yields at the operating torque")]
     surface = SURFACE_OF_PROCESS.get(process.name, "as-cut")
     gradient = gradients_per_mm(design.spiral.thickness_m, design.spiral.fillet_radius_m)[1]
     try:
         line, _ = rated_line(design.material, gradient_per_mm=gradient, surface=surface)
-        note = fatigue_strength(design.material).note
+        strength = fatigue_strength(design.material)
     except DesignError as error:
         return [*lines, ("life", str(error))]
     cycles = ALLOWED_DAMAGE * line.cycles(stress)
@@ -119,7 +120,8 @@ def _life(design: SpringDesign, result: StiffnessResult, process: Process) -> li
         *lines,
         (
             f"life at +-{torque:g} Nm, {100 * SURVIVAL:g} % survival",
-            f"{cycles:.2g} cycles to a damage of {ALLOWED_DAMAGE:g} ({surface}; {note})",
+            f"{life_text(cycles, strength)} to a damage of {ALLOWED_DAMAGE:g} ({surface};"
+            f" {strength.note})",
         ),
     ]
 

@@ -4,6 +4,8 @@ Sources: Shigley's Mechanical Engineering Design, 9th ed., example 6-3 and table
 guideline, 6th ed.; ASTM E1049-85, the rainflow example of figure 6.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -16,6 +18,7 @@ from dftfs.analysis.strength.fkm import (
     SURFACES,
     fatigue_strength,
     gradients_per_mm,
+    life_text,
     notch_support,
     surface_factor,
     survival_factor,
@@ -154,3 +157,12 @@ def test_a_history_that_cannot_be_counted_is_refused_in_one_line(tmp_path, text,
     path.write_text(text)
     with pytest.raises(DesignError, match=message):
         read_blocks(path)
+
+
+def test_a_life_outside_the_data_is_no_number():
+    tested = fatigue_strength(lookup("al-7075-t6"))
+    assert life_text(880.0, tested) == "below 1e3 cycles (outside the S-N line)"
+    assert life_text(2.5e5, tested) == "2.5e+05 cycles"
+    beyond = life_text(1.5e11, tested)
+    assert beyond == f"beyond {tested.cycles:.2g} cycles (outside the tests)"
+    assert "estimate" in life_text(1.5e11, replace(tested, measured=False))
