@@ -68,15 +68,13 @@ def run(arguments: argparse.Namespace) -> int:
     folder = prepared(arguments, arguments.out or Path("out") / f"deliver-{design.name}")
     target = folder / f"{design.name}-{arguments.revision}.zip"
     refuse_existing([target], force=arguments.force)
-    result, plane, bars = solved_for_delivery(design, say)
-    tolerance = drawing_tolerance(
-        design,
-        process,
-        share=arguments.yield_percent / 100,
-        solid_Nm_per_rad=result.stiffness_Nm_per_rad,
-    )
+    result, plane, errors = solved_for_delivery(design, say)
+    share, solid = arguments.yield_percent / 100, result.stiffness_Nm_per_rad
+    tolerance = drawing_tolerance(design, process, share=share, solid_Nm_per_rad=solid)
     say(tolerance.line())
-    found = certificate(design, result, process, tolerance, plane_Nm_per_rad=plane, bars=bars)
+    found = certificate(
+        design, result, process, tolerance, plane_Nm_per_rad=plane, stress_errors=errors
+    )
     shop = ShopData(
         part_number=arguments.part,
         revision=arguments.revision,

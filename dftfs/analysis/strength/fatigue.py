@@ -18,7 +18,7 @@ from dftfs.errors import DesignError
 
 _STATIC_CYCLES, _MOST_STATIC_SHARE = 1e3, 0.9
 _TRUE_OVER_ULTIMATE_PA = 345e6  # 50 kpsi: true fracture strength over the ultimate, Shigley 6-11
-_ENDURANCE_SHARE, _MOST_ENDURANCE_PA = 0.5, 700e6  # of a polished steel specimen, Shigley 6-8
+_ENDURANCE_SHARE, _MOST_ENDURANCE_PA = 0.5, 700e6  # of a smooth steel specimen, Shigley 6-8
 _ENDURANCE_REVERSALS = 2e6
 
 

@@ -175,7 +175,7 @@ def mesh_series(
     return tuple(found)
 
 
-def stress_bars(
+def stress_errors(
     problem: TorsionProblem,
     torque_Nm: float,
     *,

@@ -130,9 +130,9 @@ def _margin(life: FatigueLife, damage: float) -> str:
     if damage <= 0:
         return "no damage"
     total = sum(point.cycles for point in life.points)
-    words = life_text(total / damage, life.strength)
-    if words.startswith(("below", "beyond")):
-        return f"{words} to failure"
+    text = life_text(total / damage, life.strength)
+    if text.startswith(("below", "beyond")):
+        return f"{text} to failure"
     return f"the spectrum {1 / damage:.3g} times to failure"
 
 

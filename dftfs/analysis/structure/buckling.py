@@ -20,7 +20,7 @@ from dftfs.errors import DesignError
 from dftfs.fem.linear_model import lowest_modes
 from dftfs.fem.newton import solve_path
 
-_MOST_STABLE_BESIDE = 8  # stable modes nearer to zero than an unstable one, at most
+_MOST_NEARER = 8  # stable modes nearer to zero than an unstable one, at most
 FARTHEST = 5.0  # times the last state: an extrapolated loss of stability beyond it is none
 
 
@@ -89,7 +89,7 @@ def stability(
         tangent = spring.tangent(spring.spread(state.displacement_m))
         reduced = (transform.T @ tangent @ transform).tocsr()
         values, _, unstable = lowest_modes(reduced, mass, 1, solver=solver)
-        for more in range(_MOST_STABLE_BESIDE):  # next to zero is not the lowest
+        for more in range(_MOST_NEARER):  # next to zero is not the lowest
             if np.count_nonzero(values < 0) >= unstable:
                 break
             values, _, _ = lowest_modes(reduced, mass, unstable + more, solver=solver)

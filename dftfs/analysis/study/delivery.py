@@ -29,7 +29,7 @@ from dftfs.analysis.structure.stability_checks import (
 )
 from dftfs.analysis.study.drawing_tolerance import DrawingTolerance
 from dftfs.analysis.study.measuring_sheet import measuring_sheet
-from dftfs.analysis.study.run import bars_of_stress, beyond_for, design_hash, study_checks
+from dftfs.analysis.study.run import beyond_for, design_hash, errors_of_stress, study_checks
 from dftfs.analysis.torsion.curve_file import curve_csv
 from dftfs.analysis.torsion.result import SIGN, StiffnessResult
 from dftfs.cad.drawing_sheet import Sheet, ShopData
@@ -61,7 +61,7 @@ def certificate(
     tolerance: DrawingTolerance,
     *,
     plane_Nm_per_rad: float,
-    bars: Mapping[str, float],
+    stress_errors: Mapping[str, float],
 ) -> Certificate:
     """Stiffness, first contact, stress, life and mass of a design, with their models."""
     lines = [
@@ -86,7 +86,7 @@ def certificate(
     return Certificate(
         design=design,
         lines=tuple(lines),
-        checks=(*study_checks(design, result, bars), *_stays_in_plane(design, result)),
+        checks=(*study_checks(design, result, stress_errors), *_stays_in_plane(design, result)),
         curve=result,
     )
 
@@ -131,7 +131,7 @@ def solved_for_delivery(
 ) -> tuple[StiffnessResult, float, dict[str, float]]:
     """The 3D curve both ways to first contact or, with contact, to the operating torque.
 
-    Beside it the plane-stress stiffness at rest, and the error bars of the stress.
+    Beside it the plane-stress stiffness at rest, and the error of the stress by region.
 
     Raises
     ------
@@ -152,7 +152,7 @@ def solved_for_delivery(
         states_beyond=_STATES_BEYOND,
         on_progress=on_progress,
     )
-    return result, plane.stiffness_Nm_per_rad, bars_of_stress(planar, plane, on_progress)
+    return result, plane.stiffness_Nm_per_rad, errors_of_stress(planar, plane, on_progress)
 
 
 def packed(files: dict[str, bytes]) -> bytes:

@@ -18,7 +18,7 @@ from dftfs import __version__
 from dftfs.analysis.jobs.worker_pool import METHOD, follow_parent
 from dftfs.analysis.strength.checks import Check, contact_checks, stiffness_check, yield_check
 from dftfs.analysis.strength.friction_loop import FrictionLoop, friction_loop
-from dftfs.analysis.strength.mesh_series import stress_bars
+from dftfs.analysis.strength.mesh_series import stress_errors
 from dftfs.analysis.strength.yield_and_set import STRUCTURAL
 from dftfs.analysis.structure.lateral import softest_lateral_stiffness
 from dftfs.analysis.structure.result import StructureResult, structural_result
@@ -99,7 +99,7 @@ def run_study(
     planar, solid, structure = _finite_elements(planar_problem, solid_problem, options, stage)
     with stage("mesh series"):
         error = stiffness_error(solid_problem, on_progress=on_progress)
-        bars = bars_of_stress(planar_problem, planar, on_progress)
+        stress_errors = errors_of_stress(planar_problem, planar, on_progress)
     with stage("lateral stiffness"):
         lateral = softest_lateral_stiffness(planar_problem)
     loop = None
@@ -110,7 +110,7 @@ def run_study(
         actuator = run_with_spring(scenario, solid, f"{design.name}, {solid.model}")
     return StudyResult(
         design=design,
-        checks=study_checks(design, solid, bars),
+        checks=study_checks(design, solid, stress_errors),
         closed_forms=simple.closed_forms,
         eq_2_1_Nm_per_rad=simple.eq_2_1_Nm_per_rad,
         rod=simple.rod,
@@ -216,22 +216,24 @@ def beyond_for(free: StiffnessResult, torque_Nm: float | None, least: float) -> 
     return min(LARGEST_BEYOND, max([least, *needed]))
 
 
-def bars_of_stress(
+def errors_of_stress(
     planar: TorsionProblem, free: StiffnessResult, say: Callable[[str], None]
 ) -> dict[str, float]:
-    """Error bars of the stress for the check against yield; none where nothing is judged."""
+    """Error of the stress by region for the check against yield; none where nothing is judged."""
     design = planar.design
     torque = design.requirements.operating_torque_Nm
     if torque is None or design.material.yield_strength_Pa is None:
         return {}
     touches = [abs(touch.torque_Nm) for touch in free.contact_onset.values() if touch]
-    return stress_bars(planar, min([torque, *(_FREE * each for each in touches)]), on_progress=say)
+    return stress_errors(
+        planar, min([torque, *(_FREE * each for each in touches)]), on_progress=say
+    )
 
 
 def study_checks(
-    design: SpringDesign, solid: StiffnessResult, bars: Mapping[str, float] | None = None
+    design: SpringDesign, solid: StiffnessResult, stress_errors: Mapping[str, float] | None = None
 ) -> tuple[Check, ...]:
-    """The design's requirements judged on the 3D result, stress with the bars of its regions."""
+    """The design's requirements judged on the 3D result, stress with the error of its region."""
     asked, material = design.requirements, design.material
     onsets = {
         name: None if onset is None else abs(onset.torque_Nm)
@@ -252,7 +254,7 @@ def study_checks(
             yield_strength_Pa=material.yield_strength_Pa,
             no_strengths=material.no_strengths,
             model=solid.model,
-            bar=(bars or {}).get(worst, 0.0),
+            bar=(stress_errors or {}).get(worst, 0.0),
             reached_Nm=solid.reached_Nm(),
             material=material,
         ),

@@ -124,8 +124,8 @@ def _safety(study: StudyResult) -> BigNumber:
     strength = study.design.material.yield_strength_Pa
     check = next((c for c in study.checks if c.name == "safety factor to yield"), None)
     if check is not None and check.value is not None:
-        said = "extrapolated" in check.note
-        beyond = "" if said else _beyond_contact(study, asked.operating_torque_Nm)
+        stated = "extrapolated" in check.note
+        beyond = "" if stated else _beyond_contact(study, asked.operating_torque_Nm)
         return BigNumber(
             label=f"Safety factor to yield at ±{asked.operating_torque_Nm:g} Nm",
             value=plain(check.value, 3),

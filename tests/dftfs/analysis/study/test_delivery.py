@@ -19,7 +19,7 @@ def test_a_direction_without_contact_says_how_far_it_was_followed(tmp_path):
     free = replace(solid, contact_onset={**solid.contact_onset, "winding": None})
     design, wire = load_design("al1", {"width_mm": "8"}), find_process("wire-edm")
     found = certificate(
-        design, free, wire, drawing_tolerance(design, wire), plane_Nm_per_rad=66.0, bars={}
+        design, free, wire, drawing_tolerance(design, wire), plane_Nm_per_rad=66.0, stress_errors={}
     )
     lines = dict(found.lines)
     far = f"{abs(end.torque_Nm):.2f} Nm at {abs(end.deflection_rad):.4f} rad"
