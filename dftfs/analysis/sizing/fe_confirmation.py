@@ -186,8 +186,7 @@ def judge_2d(
             *yield_check(
                 needs,
                 stress_per_torque={direction: value / asked for direction, value in worst.items()},
-                yield_strength_Pa=design.material.yield_strength_Pa,
-                no_strengths=design.material.no_strengths,
+                material=design.material,
                 model=curve["model"],
             ),
             *_life_check(task, design, max(worst.values())),

@@ -99,17 +99,15 @@ def yield_check(
     requirements: Requirements,
     *,
     stress_per_torque: dict[str, float],
-    yield_strength_Pa: float | None,
-    no_strengths: str,
+    material: Material,
     model: str,
     bar: float = 0.0,
     reached_Nm: Mapping[str, float] | None = None,
-    material: Material | None = None,
 ) -> list[Check]:
     """Safety factor to first yield at the operating torque, the worse of both directions.
 
-    It passes if the stress with its error bar does; what is extrapolated beyond the curve may fail
-    but is open otherwise.
+    It passes if the stress with its error bar does; an extrapolated stress may fail or is open. The
+    note has the strength's basis, typical or guaranteed, and the factor that the guarantee leaves.
 
     Parameters
     ----------
@@ -119,15 +117,12 @@ def yield_check(
         Relative error bar of the stress by its mesh series; infinite where it has no limit.
     reached_Nm : mapping of direction to float, optional
         The largest torque that was computed.
-    material : Material, optional
-        The note says whether its strength is typical or guaranteed, and the factor that the
-        guaranteed one leaves; the verdict is by the strength given.
     """
     torque = requirements.operating_torque_Nm
     if torque is None:
         return []
     limit = f"at least {requirements.min_safety_factor_yield:g} at {torque:g} Nm"
-    if yield_strength_Pa is None:
+    if material.yield_strength_Pa is None:
         return [
             Check(
                 name="safety factor to yield",
@@ -135,17 +130,17 @@ def yield_check(
                 unit="",
                 limit=limit,
                 passed=None,
-                note=f"the material has no strengths: {no_strengths}",
+                note=f"the material has no strengths: {material.no_strengths}",
                 source=model,
             )
         ]
     direction = max(stress_per_torque, key=lambda key: stress_per_torque[key])
     stress = stress_per_torque[direction] * torque
-    factor = yield_strength_Pa / stress
+    factor = material.yield_strength_Pa / stress
     least, last = requirements.min_safety_factor_yield, (reached_Nm or {}).get(direction, torque)
     found = f"{stress / 1e6:.0f}" + (f" +- {bar * stress / 1e6:.2g}" if 0 < bar < inf else "")
-    note = f"{found} MPa {direction} against {yield_strength_Pa / 1e6:.0f} MPa"
-    basis = "" if material is None else material.strength_note(stress)
+    note = f"{found} MPa {direction} against {material.yield_strength_Pa / 1e6:.0f} MPa"
+    note += f"; {basis}" if (basis := material.strength_note(stress)) else ""
     finite, doubt = bar if bar < inf else 0.0, _doubt(bar, torque, last)
     kept = factor >= least * (1 + finite)
     return [
@@ -155,7 +150,7 @@ def yield_check(
             unit="",
             limit=limit,
             passed=None if kept and doubt else kept,
-            note=(f"{note}; {basis}" if basis else note) + doubt,
+            note=note + doubt,
             source=model,
         )
     ]

@@ -251,8 +251,6 @@ def study_checks(
         *yield_check(
             asked,
             stress_per_torque=stress,
-            yield_strength_Pa=material.yield_strength_Pa,
-            no_strengths=material.no_strengths,
             model=solid.model,
             bar=(stress_errors or {}).get(worst, 0.0),
             reached_Nm=solid.reached_Nm(),

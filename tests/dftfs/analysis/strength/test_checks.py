@@ -10,6 +10,7 @@ from dftfs.analysis.study.run import beyond_for, study_checks
 from dftfs.design import Requirements, load_design
 from tests.cases.report_study import small_study
 
+ALUMINIUM = replace(load_design("al1").material, yield_strength_Pa=276e6)
 NEEDS = Requirements(operating_torque_Nm=10.0, min_safety_factor_yield=1.2)
 
 
@@ -17,8 +18,7 @@ def judged(stress_MPa, **more):
     (check,) = yield_check(
         NEEDS,
         stress_per_torque={"winding": stress_MPa * 1e5, "unwinding": 1e5},
-        yield_strength_Pa=276e6,
-        no_strengths="",
+        material=ALUMINIUM,
         model="3D hex20",
         **more,
     )
