@@ -14,6 +14,7 @@ from rsea_core.effects.variant import Law, RunConditions, TrialMachine, Unknown,
 from rsea_core.errors import TermError
 
 N_BRANCHES = 3  # branches of a Maxwell model
+RISE = "stiffness_rise_fast_over_static"
 SPRING_DAMPING = slots("spring_damping")
 BRANCH_STIFFNESS = block("branch_stiffness", N_BRANCHES, internal=True)
 BRANCH_TIME = block("branch_time", N_BRANCHES)
@@ -65,7 +66,9 @@ class SpringViscoelastic(Term):
     law: ClassVar[str] = "maxwell-branches"
     port: ClassVar[Port] = Port.SPRING
     headline: ClassVar[str] = "The spring is viscoelastic: its torque depends on the rate."
-    figure_units: ClassVar[Mapping[str, str]] = {"stiffness_rise_fast_over_static": "-"}
+    figure_units: ClassVar[Mapping[str, str]] = {
+        RISE: "-", "damping_Nms_per_rad": "Nms/rad",
+    }  # fmt: skip
     relevant: ClassVar = RelevantSize(
         variant="one branch", part="spring",
         size=lambda m: (
@@ -97,14 +100,21 @@ class SpringViscoelastic(Term):
         return tuple(pair for pair in pairs if pair[0] > 0.0)
 
     def comparable(self, context: Context = NO_CONTEXT) -> Mapping[str, float | str]:
-        """Instantaneous over relaxed stiffness, dashpot left out."""
+        """Instantaneous over relaxed stiffness of branches; the damping of a damper.
+
+        A damper alone has no stiffness at fast deflections: their ratio would say that there is no
+        effect.
+        """
         relaxed = context.need(self.effect, "spring_stiffness_Nm_per_rad")
         if not relaxed > 0.0:
             raise TermError(
                 f"{self.effect}: spring_stiffness_Nm_per_rad = {relaxed} must be above 0"
             )
-        fast = sum(stiffness for stiffness, _ in self.branches)
-        return {"stiffness_rise_fast_over_static": 1.0 + fast / relaxed}
+        damper = {"damping_Nms_per_rad": self.damping_Nms_per_rad}
+        if self.damping_Nms_per_rad > 0.0 and not self.branches:
+            return damper
+        rise = {RISE: 1.0 + sum(stiffness for stiffness, _ in self.branches) / relaxed}
+        return rise | damper if self.damping_Nms_per_rad > 0.0 else rise
 
     def numbers(self, gear: Gear) -> Mapping[str, float]:
         """The law as compiled code reads it."""
@@ -158,9 +168,10 @@ class SpringViscoelastic(Term):
 
     @classmethod
     def sentence(cls, f: FigureText) -> str:
-        """How much stiffer it is at once."""
-        return (
-            "a viscoelastic spring,"
-            f" {f.figures['stiffness_rise_fast_over_static']:.4g} times as stiff at fast as at slow"
-            " deflection"
-        )
+        """How much stiffer it is at once, or how strongly it is damped."""
+        parts = []
+        if RISE in f.figures:
+            parts.append(f"{f.figures[RISE]:.4g} times as stiff at fast as at slow deflection")
+        if "damping_Nms_per_rad" in f.figures:
+            parts.append(f"damped by {f('damping_Nms_per_rad', 'Nms/rad')}")
+        return f"a viscoelastic spring, {' and '.join(parts)}"

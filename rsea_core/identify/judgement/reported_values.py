@@ -81,9 +81,13 @@ def shown(figures: Mapping[str, dict]) -> bool:
     log-likelihood units there, by a size that the scatter between blocks and recordings does not
     tell from none.
     """
-    known = [(n, f) for n, f in figures.items() if f["std"]]
-    sizes = [(abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"]) for n, f in known]
-    return not sizes or any(size >= SHOWN_STD * std for size, std in sizes)
+    sizes = [
+        (abs(f["value"] - (1.0 if n in AT_ONE else 0.0)), f["std"] or 0.0)
+        for n, f in figures.items()
+        if not isinstance(f["value"], str)
+    ]
+    # a figure that equals none, without a deviation, depends on no value that was fitted
+    return not sizes or any(size >= SHOWN_STD * std for size, std in sizes if size or std)
 
 
 def sizes_shown(law: Law, first: int, x: NDArray, spread: Spread) -> bool:

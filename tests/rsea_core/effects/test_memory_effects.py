@@ -21,6 +21,7 @@ from rsea_core.effects import (
     SpringViscoelastic,
     TorqueRipple,
 )
+from rsea_core.effects.figure_text import FigureText
 
 BENCH = replace(Rig.preset("rsea-bench"), current_limit_A=None)
 R, L, K_T, V, N = 3.78, 4.56e-3, 0.3056, 48.0, 60.0
@@ -105,6 +106,16 @@ def test_viscoelastic_spring():
     close(run(term), states, [torque(y) for y in states])
     figures = term.comparable(Context(spring_stiffness_Nm_per_rad=64.0))
     assert figures["stiffness_rise_fast_over_static"] == pytest.approx(1.5)
+    assert figures["damping_Nms_per_rad"] == 0.3
+
+
+def test_a_damper_alone_is_told_by_its_damping_and_by_no_stiffness():
+    """Its ratio of stiffnesses is that of a spring without any effect."""
+    context = Context(spring_stiffness_Nm_per_rad=64.0)
+    term = SpringViscoelastic(damping_Nms_per_rad=0.3)
+    assert term.comparable(context) == {"damping_Nms_per_rad": 0.3}
+    text = FigureText(figures=term.comparable(context), column="", linear=False)
+    assert SpringViscoelastic.sentence(text) == "a viscoelastic spring, damped by 0.3 Nms/rad"
 
 
 def test_maxwell_slip_hysteresis():

@@ -24,6 +24,7 @@ from rsea_core.identify.judgement.reported_values import shown, sizes_shown
         ({"loop_width_Nm": (0.0, 0.02), "loop_energy_J": (0.0, 0.01)}, False),
         ({"resistance_rise_fraction": (0.01, 0.02), "peak_winding_C": (40.0, 3.0)}, True),
         ({"law": ("table", None)}, True),  # nothing to judge it by
+        ({"stiffness_rise_fast_over_static": (1.0, 0.0)}, False),  # that of none, of no value
     ],
 )
 def test_a_figure_two_deviations_from_none_shows_an_effect(figures, expected):
