@@ -1,18 +1,18 @@
 """`dftfs diagnose`: a case folder in, a diagnosis, its model and a report out."""
 
 import argparse
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dftfs.cli.common import emit, progress
-from dftfs.cli.output import add_pdf, now_and_then, output_folder, prepared, print_page
+from dftfs.cli.fe_curve import read_fe
+from dftfs.cli.output import add_pdf, output_folder, prepared, print_page
 from dftfs.cli.own_effects import add_effects, load_own_effects
+from dftfs.cli.progress_lines import now_and_then, still_working
 from dftfs.staging import reason, staging_folder
 
 if TYPE_CHECKING:  # what the work needs is imported by it: `--help` needs none of it
-    from rsea_core.effects.registry import SpringCurve
     from rsea_core.identify.result.diagnosis import Diagnosis
     from rsea_core.recordings.case import Case
 
@@ -61,8 +61,9 @@ def run(arguments: argparse.Namespace) -> int:
         refuse_existing(every, force=arguments.force)
     design = None if arguments.fe is None else read_fe(arguments.fe, progress())
     say = progress() if arguments.verbose else now_and_then(progress())
-    quick, thorough = arguments.quick, arguments.thorough
-    found = diagnose(case, quick=quick, thorough=thorough, design=design, say=say)
+    effort = {"quick": arguments.quick, "thorough": arguments.thorough}
+    with still_working(progress()):
+        found = diagnose(case, design=design, say=say, **effort)
     folder = output_folder(arguments, f"diagnose-{case.name}")
     if folder is not None:
         paths = write_files(found, folder, case)
@@ -75,8 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
 def write_files(found: "Diagnosis", folder: Path, case: "Case | None" = None) -> dict[str, Path]:
     """Diagnosis, model, report, and the next experiment where there is one: all or none of them.
 
-    They are written to a temporary folder and moved together; files of an older diagnosis that this
-    one does not have are removed.
+    They are moved together; files of an older diagnosis that this one does not have are removed.
     """
     from dftfs.files import OutputError
     from rsea_core.identify.result.diagnosis import DOCUMENT, MODEL, SOMETIMES, remove_older
@@ -106,20 +106,3 @@ def _write_report(found: "Diagnosis", path: Path, case: "Case | None") -> None:
     if found.next_experiment is not None:
         page = replace(page, record_next=found.next_experiment["sentence"])
     write_diagnosis_report(page, path)
-
-
-def read_fe(name: str, say: Callable[[str], None]) -> "SpringCurve":
-    """The curve that a spring should have: of a CSV file, or solved of a design."""
-    if name.endswith(".csv"):
-        from rsea_core.model.spring_curve_file import read_spring_curve
-
-        return read_spring_curve(name)
-    from dftfs.analysis.study.actuator import spring_curve
-    from dftfs.analysis.torsion.problem import TorsionProblem
-    from dftfs.analysis.torsion.solve import solve_torsion  # mesher and engine take a second
-    from dftfs.design import load_design
-
-    design = load_design(name)
-    problem = TorsionProblem(design=design, dimension=2)
-    say(f"spring {design.name}: {problem.model}")
-    return spring_curve(solve_torsion(problem, on_progress=say), f"{design.name}, {problem.model}")

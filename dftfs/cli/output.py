@@ -1,9 +1,8 @@
-"""Where the commands write without --out, and progress that does not flood."""
+"""Where the commands write without --out."""
 
 import argparse
 import os
-import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 
 from dftfs.cli.common import progress
@@ -93,17 +92,3 @@ def write_result(
     return write_result_page(
         page, title=title, kicker=arguments.parser.prog, text=text, pictures=pictures, inputs=files
     )
-
-
-def now_and_then(say: Callable[[str], None], seconds: float = 5.0) -> Callable[[str], None]:
-    """A progress function that passes on the first message and one in so many seconds."""
-    last = -seconds
-
-    def sometimes(message: str) -> None:
-        nonlocal last
-        now = time.perf_counter()
-        if now - last >= seconds:
-            last = now
-            say(message)
-
-    return sometimes

@@ -25,6 +25,7 @@ class Work:
 
 
 _current: ContextVar[Work | None] = ContextVar("work", default=None)
+_open: list[Work] = []  # for other threads, which do not see a context variable
 
 
 @contextmanager
@@ -32,10 +33,17 @@ def limited_work(most: float, *, strict: bool = False) -> Iterator[Work]:
     """A context in which work is counted and limited; with inf it is only counted."""
     work = Work(most, strict)
     token = _current.set(work)
+    _open.append(work)
     try:
         yield work
     finally:
+        _open[:] = [other for other in _open if other is not work]
         _current.reset(token)
+
+
+def work_in_progress() -> Work | None:
+    """The innermost work that is counted now, on whatever thread; for messages only."""
+    return _open[-1] if _open else None
 
 
 @contextmanager

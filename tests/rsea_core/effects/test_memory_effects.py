@@ -109,7 +109,7 @@ def test_viscoelastic_spring():
     assert figures["damping_Nms_per_rad"] == 0.3
 
 
-def test_a_damper_alone_is_told_by_its_damping_and_by_no_stiffness():
+def test_a_damper_alone_is_reported_by_its_damping_and_by_no_stiffness():
     """Its ratio of stiffnesses is that of a spring without any effect."""
     context = Context(spring_stiffness_Nm_per_rad=64.0)
     term = SpringViscoelastic(damping_Nms_per_rad=0.3)

@@ -1,5 +1,7 @@
 """Work is counted within a limit alone, and what is left out because of it is known."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import pytest
 
 from rsea_core.numeric.work_limit import (
@@ -7,6 +9,7 @@ from rsea_core.numeric.work_limit import (
     limited_work,
     no_work_left,
     share_of_work,
+    work_in_progress,
 )
 
 
@@ -30,6 +33,16 @@ def test_an_inner_limit_hides_the_outer_one_until_it_ends():
             count_work(100.0)
             assert not no_work_left()
         assert (outer.done, inner.done) == (0.0, 100.0)
+
+
+def test_another_thread_sees_the_innermost_work_in_progress():
+    assert work_in_progress() is None
+    with limited_work(1.0) as outer, ThreadPoolExecutor(1) as pool:
+        assert pool.submit(work_in_progress).result() is outer
+        with limited_work(1.0) as inner:
+            assert pool.submit(work_in_progress).result() is inner
+        assert pool.submit(work_in_progress).result() is outer
+    assert work_in_progress() is None
 
 
 def test_an_error_ends_the_limit():
