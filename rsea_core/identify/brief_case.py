@@ -23,7 +23,7 @@ from rsea_core.recordings.recording import Recording
 BRIEF_ROWS, BRIEF_ROWS_OF_EACH = 2500, 250  # fitted: of all recordings, or more of many
 MOST_ROWS = 2  # times as many, where motions are slow
 ROWS_OF_CYCLE = 10  # of the fastest cycle, at least
-CYCLES, ENOUGH_CYCLES = 1.0, 3.0  # of its own motion: that a recording should show, and are enough
+CYCLES = 1.0  # of its own motion, that a recording should show
 MOVED = 10.0  # noise deviations that a reading moves where a motion begins
 LEAD = 0.05  # of the rows that are kept, before it
 REASON = "without --quick all rows are"
@@ -53,13 +53,13 @@ def brief_case(case: Case) -> tuple[Case, tuple[Finding, ...]]:
 
 def _rows_of_motion(case: Case) -> int:
     """Rows in which every recording shows a cycle of its own motion."""
-    longest = max(_span_s(r, CYCLES) / r.sample_time_s for r in case.identification)
+    longest = max(_span_s(r) / r.sample_time_s for r in case.identification)
     return int(longest * len(case.identification))
 
 
-def _span_s(r: Recording, cycles: float) -> float:
-    """Seconds in which a recording shows so many cycles of its motion; all of it at most."""
-    return min(cycles * 2.0 * np.pi / max(motion_rate(r), 1e-9), r.rows * r.sample_time_s)
+def _span_s(r: Recording) -> float:
+    """Seconds in which a recording shows a cycle of its motion; all of it at most."""
+    return min(CYCLES * 2.0 * np.pi / max(motion_rate(r), 1e-9), r.rows * r.sample_time_s)
 
 
 def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:
@@ -68,7 +68,7 @@ def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:
     cycles = [cycle_s(machine_of(e.base), e.stiffness, e.recording) for e in problem.prepared]
     longest_s = min(cycles) / ROWS_OF_CYCLE
     share = most / len(case.identification)
-    needed_s = max(_span_s(r, ENOUGH_CYCLES) for r in case.identification) / share
+    needed_s = max(_span_s(r) for r in case.identification) / share
     coarse = decimate(case, min(longest_s, needed_s), jumps=True)
     findings = tuple(
         Finding(

@@ -32,6 +32,7 @@ ASK_BELOW = 0.9
 BROKEN, BROKEN_ALONE = 2.5, 4.0  # standard deviations of a law, of one of a single reading
 SOURCES = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A")
 EXACTLY = 1e-4  # of its scatter: no sensor follows an angle as closely
+LENGTHS = ("m", "mm", "um")  # what a scale counts in can only be seen beside another reading
 STAMPS = ("ts", "tstamp", "t_stamp")  # a time where it rises evenly, a spring's torque elsewhere
 UNKNOWN = (
     "column {!r}: what is it? Its name says nothing that is known: --column NAME={name}:UNIT,"
@@ -240,6 +241,8 @@ def _with_signs(
         sign_known = still or seen.get(c.target, True)
         confidence = 1.0 if still else best.confidence[c.name] * (1.0 if sign_known else 0.6)
         against = c.prior <= STATED + 0.1  # what the log itself states, or any size it can have
+        tied = any(c.target in law.columns for law in best.laws)
+        against |= c.unit in LENGTHS and evidence[c.name].unit is None and not tied
         if (against or _broken_law(c.target, best) is not None) and not still:
             confidence = min(confidence, 0.5)
         columns.append(
