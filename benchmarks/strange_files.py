@@ -160,7 +160,8 @@ def outcome(
     lines = printed.getvalue().strip().splitlines()
     if status != 0:
         left = set(work.rglob("*")) - before
-        good = status == 2 and len(lines) == 1 and not left
+        errors = [line for line in lines if not line.startswith("question:")]
+        good = status == 2 and len(errors) == 1 and not left
         verdict = "asked" if "questions:" in lines[-1] else "refused"
         return (verdict, lines[-1]) if good else ("wrong", f"status {status}, {lines}, left {left}")
     r = read_case(out).recordings[0]

@@ -85,6 +85,8 @@ class ProposedColumn:
     reason : str
     asks : bool
         Whether it is one of the questions.
+    sign_known : bool
+        Whether the sign is seen in the log.
     """
 
     target: str
@@ -100,6 +102,7 @@ class ProposedColumn:
     confidence: float
     reason: str
     asks: bool = False
+    sign_known: bool = True
 
 
 def propose(
@@ -256,6 +259,7 @@ def _with_signs(
                 confidence=confidence,
                 reason=_reason(c, best, evidence[c.name], sign_known),
                 asks=confidence < ASK_BELOW,
+                sign_known=sign_known,
             )
         )
     return tuple(columns)
@@ -311,6 +315,8 @@ def _question(c: ProposedColumn, best: Posterior) -> str:
         side = "" if rival.side is None else f" on the {rival.side} side"
         other = answer_text(rival.target, c.name, rival.unit, sign=c.sign, side=rival.side)
         return f"{text} or {rival.target} in {rival.unit}{side}? {own}, or {other}"
+    if c.sign_known:
+        return f"{text}: nothing else in the log confirms it; if it is right: {own}"
     return (
         f"{text}: its sign cannot be determined; is + the motor's + direction?"
         f" {own}, or with sign {-c.sign:+d}"
