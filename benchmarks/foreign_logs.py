@@ -27,14 +27,14 @@ COUNTS = 1.6e-3  # half a count of 4096, with the digits of the log; of SI readi
 
 
 def imported(log: ForeignLog, rig: Path, out: Path) -> tuple[str, str]:
-    """Verdict and the line that says why."""
+    """Verdict and what says why: one line, or all questions."""
     given = ["import", *map(str, log.paths), "--rig", str(rig), "--out", str(out), *log.options]
     errors = io.StringIO()
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(errors):
         status = run_command(given)
-    line = (errors.getvalue().strip().splitlines() or [""])[-1]
+    lines = errors.getvalue().strip().splitlines() or [""]
     if status:
-        return ("asked" if "questions:" in line else "refused"), line
+        return ("asked", " | ".join(lines)) if "questions:" in lines[-1] else ("refused", lines[-1])
     recordings = read_case(out).recordings
     if len(recordings) != log.recordings:
         return "wrong", f"{len(recordings)} recordings instead of {log.recordings}"
