@@ -7,6 +7,7 @@ spring and load side are named in words, and an unknown key is an error.
 """
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from importlib import resources
@@ -25,6 +26,11 @@ from rsea_core.files.toml_tables import (
 
 PARTS = ("drive", "gear", "spring", "load")
 AXES = ("rotary", "linear")
+DRY_FRICTION = re.compile("coulomb|friction|stribeck|stiction", re.I)
+NO_DRY_FRICTION = (
+    "the machine of a rig file has no dry friction; a diagnosis reports what recordings show, and a"
+    " simulation takes it as an effect"
+)
 SERVOS = ("angle", "angle-and-rate")
 TABLES = ("rig", "tolerances", "anchor", "recording", "columns")
 CONSTANT_MISMATCH = 0.02  # k_t and k_e further apart than this are reported
@@ -219,6 +225,9 @@ class Rig:
             raise RigError(f"{where}: has no [rig] table")
         try:
             rig = table(tables["rig"], "rig", RigError)
+            dry = next((k for k in rig if DRY_FRICTION.search(k) and k not in QUANTITIES), None)
+            if dry is not None:
+                raise RigError(f"[rig] {dry}: {NO_DRY_FRICTION}")
             require_known(rig, ("name", "parts", "axis", "servo", *QUANTITIES), "[rig]", RigError)
             if "name" not in rig:
                 raise RigError("[rig] has no name")

@@ -112,6 +112,10 @@ def test_differing_constants_and_unused_values_are_findings(tmp_path):
         (MINIMAL + "[tolerances]\ngear = 0.1\n", "unknown quantity 'gear'; the nearest"),
         (MINIMAL + "[tolerances]\ngear_ratio = -0.1\n", "must be above 0"),
         (MINIMAL + '[anchor]\nquantity = ["gear_ratio"]\n', "unknown key 'quantity'"),
+        (
+            MINIMAL + "motor_coulomb_Nm = 0.009\n",
+            "motor_coulomb_Nm: the machine of a rig file",
+        ),
         (MINIMAL + '[anchor]\nquantities = ["mass"]\n', "unknown quantity 'mass'"),
         ("[rig\n", "is not TOML"),
     ],
