@@ -9,6 +9,7 @@ from rsea_core.recordings.recording import Recording
 STILL_s, STILL_SHARE = 0.3, 0.1  # a reading stands still for so long, and for this share of rows
 JUMP = 30.0  # times the steps that nine of ten rows keep to: no inertia allows it
 ALONE = 4.0  # times the steps of neighbouring rows: an oscillation has many large ones
+AS_FAST = 0.05  # share by which the speed of an angle and a velocity may differ
 FLAT_s = 0.02  # a noisy reading that stays at its extreme for this long is cut off
 OUTER = 0.1  # of the largest reading: a drive that is off reads nothing for long, and is not cut
 AT_ONCE_s = 0.01  # in which no motor or link stops from a good part of its largest speed
@@ -105,7 +106,10 @@ def _jump(r: Recording, name: str, size: float, text: str, kind: Kind) -> Findin
 
 
 def clipping_levels(r: Recording, name: str) -> list[float]:
-    """The extremes at which both noise and motion stop for a while."""
+    """The extremes at which both noise and motion stop for a while.
+
+    A velocity is not clipped where its angle passes as fast: a triangle has a constant speed.
+    """
     values = r[name]
     moves = np.abs(np.diff(values)) > 0.0
     if np.mean(moves) <= 0.5:
@@ -117,9 +121,20 @@ def clipping_levels(r: Recording, name: str) -> list[float]:
         if at_top.sum() < 3 * run or abs(top) < OUTER * float(np.abs(values).max()):
             continue
         edges = np.flatnonzero(np.diff(np.concatenate(([0], at_top.astype(int), [0]))))
-        if (edges[1::2] - edges[::2]).max() >= run:
+        longest = int(np.argmax(edges[1::2] - edges[::2]))
+        first, last = int(edges[2 * longest]), int(edges[2 * longest + 1]) - 1
+        if last - first + 1 >= run and not _passes_as_fast(r, name, first, last):
             found.append(top)
     return found
+
+
+def _passes_as_fast(r: Recording, name: str, first: int, last: int) -> bool:
+    """Whether the angle of a velocity passes, from one row to another, as it states."""
+    angle = name.replace("_velocity_rad_per_s", "_angle_rad")
+    if angle == name or angle not in r:
+        return False
+    passed = (r[angle][last] - r[angle][first]) / (r.time_s[last] - r.time_s[first])
+    return bool(abs(passed - r[name][first]) < AS_FAST * abs(r[name][first]))
 
 
 def angle_clipping_levels(r: Recording, name: str, floor: float) -> list[float]:

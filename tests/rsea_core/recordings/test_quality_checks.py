@@ -71,6 +71,20 @@ def test_a_torque_clipped_on_one_side_is_reported():
     assert "torque_Nm is clipped at 2" in reported(torque_Nm=torque)
 
 
+def test_a_velocity_is_clipped_only_where_its_angle_passes_faster():
+    """That of a triangle rests at its extreme, to a count, and that of a limited register too."""
+    t = 0.001 * np.arange(2000)
+    rng = np.random.default_rng(1)
+    triangle, sine = np.abs((t + 0.5) % 2.0 - 1.0), 1.0 - np.cos(np.pi * t)
+    for angle, most, clipped in ((triangle, 1.0, False), (sine, 2.0, True)):
+        speed = np.gradient(angle, t)
+        noisy = np.where((np.arange(2000) // 30) % 3 > 0, 0.01 * rng.random(2000), 0.0)
+        logged = np.sign(speed) * np.minimum(np.abs(speed), most - noisy)
+        logged += 1e-3 * rng.standard_normal(2000) * (np.abs(speed) < 0.95 * most)
+        found = reported(motor_angle_rad=angle, motor_velocity_rad_per_s=logged)
+        assert ("motor_velocity_rad_per_s is clipped" in found) is clipped, found
+
+
 def test_a_sensor_whose_noise_stops_is_reported():
     rng = np.random.default_rng(1)
     torque = 4.0 * np.sin(0.5 * np.arange(2000) * 0.001) + 0.02 * rng.standard_normal(2000)
