@@ -34,7 +34,11 @@ def imported(log: ForeignLog, rig: Path, out: Path) -> tuple[str, str]:
         status = run_command(given)
     lines = errors.getvalue().strip().splitlines() or [""]
     if status:
-        return ("asked", " | ".join(lines)) if "questions:" in lines[-1] else ("refused", lines[-1])
+        return (
+            ("asked", " | ".join(lines))
+            if "answer each with --column" in lines[-1]
+            else ("refused", lines[-1])
+        )
     recordings = read_case(out).recordings
     if len(recordings) != log.recordings:
         return "wrong", f"{len(recordings)} recordings instead of {log.recordings}"

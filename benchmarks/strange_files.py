@@ -162,7 +162,7 @@ def outcome(
         left = set(work.rglob("*")) - before
         errors = [line for line in lines if not line.startswith("question:")]
         good = status == 2 and len(errors) == 1 and not left
-        verdict = "asked" if "questions:" in lines[-1] else "refused"
+        verdict = "asked" if "answer each with --column" in lines[-1] else "refused"
         return (verdict, lines[-1]) if good else ("wrong", f"status {status}, {lines}, left {left}")
     r = read_case(out).recordings[0]
     if r.rows < ROWS:  # a column with fewer readings ends earlier

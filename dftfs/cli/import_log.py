@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
-from dftfs.cli.import_values import known_values, print_questions, window_of
+from dftfs.cli.import_values import known_values, refuse, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError
@@ -79,11 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
     can_ask = sys.stdin.isatty() and not arguments.yes
     proposal = decided(columns, rig, options, arguments.logs[0], _ask if can_ask else None)
     if proposal.questions and rig is not None and not (can_ask or arguments.yes):
-        print_questions(proposal.questions)
-        raise DftfsError(
-            f"{len(proposal.questions)} questions: answer each with --column, or accept the"
-            " proposals with --yes; nothing was written"
-        )
+        refuse(proposal.questions)
     proposal = replace(proposal, notes=(*proposal.notes, *unread_text(groups[0])))
     listed = [r for group in groups for r in listed_recordings(group, proposal, rig, options)]
     channels = channels_of(groups[0])

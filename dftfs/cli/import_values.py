@@ -3,6 +3,7 @@
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from dftfs.errors import DftfsError
 from rsea_core.importing.robot_model import rig_values
@@ -11,13 +12,23 @@ from rsea_core.recordings.recording import ROLES
 MOST_ASKED = 8
 
 
-def print_questions(questions: Sequence[str]) -> None:
-    """The first questions, a line each: of a log of a hundred unknown columns, a hundred."""
+def refuse(questions: Sequence[str]) -> NoReturn:
+    """Print the first questions, a line each, and end: nobody is there to answer them.
+
+    Raises
+    ------
+    DftfsError
+        With their number.
+    """
     for question in questions[:MOST_ASKED]:
         print(f"question: {question}", file=sys.stderr)
     if len(questions) > MOST_ASKED:
         more = len(questions) - MOST_ASKED
         print(f"question: and {more} more (--json --yes lists them)", file=sys.stderr)
+    raise DftfsError(
+        f"{len(questions)} question{'s' if len(questions) > 1 else ''}: answer each with --column,"
+        " or accept the proposals with --yes; nothing was written"
+    )
 
 
 def window_of(text: str) -> tuple[float, float, str | None]:

@@ -1,8 +1,8 @@
 """What a quick look fits of a case: few rows, of motion and not of standstill.
 
-A search simulates every row some thousand times. Of a recording with more rows than its share, rows
-that are far shorter than the machine's fastest cycle are taken together, and what is left begins
-where the motion does.
+A search simulates every row some thousand times. A recording with more rows than its share is cut;
+what is kept begins where its motion does. Where a cycle of a slow motion has more rows than that,
+only every so manieth row is kept, as far as the fastest cycle of machine and motion allows.
 """
 
 from collections.abc import Sequence
@@ -13,9 +13,8 @@ import numpy as np
 from rsea_core.identify.candidates.motion_cycles import cycle_s, motion_rate
 from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.problem import machine_of
-from rsea_core.identify.fitting.truncation import truncate
+from rsea_core.identify.fitting.truncation import rows_between, truncate
 from rsea_core.identify.multistep.experiment import MultistepProblem
-from rsea_core.numeric.arrays import read_only
 from rsea_core.recordings.case import Case, noise_floor
 from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
@@ -70,11 +69,16 @@ def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:
     share = most / len(case.identification)
     needed_s = max(_span_s(r) for r in case.identification) / share
     coarse = decimate(case, min(longest_s, needed_s), jumps=True)
+    made = zip(case.recordings, coarse.recordings, strict=True)
+    # rows at uneven times cannot be counted off
+    made = tuple(new if old.logged is None else old for old, new in made)
+    coarse = replace(coarse, recordings=made)
     findings = tuple(
         Finding(
             kind=Kind.TRUNCATED,
             file=new.file,
-            text=f"fitted in rows of {new.sample_time_s:.3g} s, means of those logged: {REASON}",
+            text=f"every {round(new.sample_time_s / old.sample_time_s)}th row was fitted, with the"
+            f" mean of the command between: {REASON}",
         )
         for old, new in zip(case.recordings, coarse.recordings, strict=True)
         if new.rows < old.rows and new.role == "identification"
@@ -91,9 +95,7 @@ def _from_first_motion(case: Case, r: Recording, most: int) -> Recording:
     begins = [_first_beyond(r[name], MOVED * floors[name]) for name in r.responses]
     lead = int(LEAD * (r.rows - spare))
     first = min(max(min(begins) - lead, 0), spare) if begins else 0
-    columns = {name: read_only(values[first:].copy()) for name, values in r.columns.items()}
-    columns["time_s"] = read_only(columns["time_s"] - columns["time_s"][0])
-    return replace(r, columns=columns)
+    return rows_between(r, first, r.rows) if first else r
 
 
 def _first_beyond(values: Sequence[float], allowed: float) -> int:

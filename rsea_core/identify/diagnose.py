@@ -53,6 +53,7 @@ BETTER = 0.95  # free-run error over the other's, fitted and held-out recordings
 LIKE_AN_OFFSET = frozenset((LoadUnbalance.effect, SensorOffset.effect))
 SHORT_LOG = 20_000  # rows fitted: of more, windows would take many minutes
 PREDICTED = 0.02  # of the spread of recordings held out: no other search is needed below
+NEAREST_NAME = 0.1  # confidence of a name that is only the nearest to what was seen
 WINDOWS_FAILED = Finding(
     kind=Kind.METHOD,
     text="the search in windows failed numerically; laws were judged by free runs of whole"
@@ -244,22 +245,25 @@ def _better(first: Diagnosis, second: Callable[[], Diagnosis], say) -> Diagnosis
     own = held_out_error(other, "parameters_only")  # the same where it names no law
     if not (theirs < BETTER * mine and held_out_error(other) <= own):
         return first
-    return _with_disagreement(other, first)
+    return with_disagreement(other, first)
 
 
-def _with_disagreement(chosen: Diagnosis, other: Diagnosis) -> Diagnosis:
+def with_disagreement(chosen: Diagnosis, other: Diagnosis) -> Diagnosis:
     """The chosen diagnosis with a note on what the other method found and this one does not have.
 
-    A law that one of two methods shows clearly must not disappear without a word.
+    A law that one of two methods fits must not disappear without a word; a nearest name may.
     """
     named = {effect["name"] for effect in chosen.document["effects"]}
-    lost = [e for e in other.document["effects"] if e["name"] not in named]
+    lost = [
+        e for e in other.document["effects"]
+        if e["name"] not in named and e["confidence"] > NEAREST_NAME
+    ]  # fmt: skip
     if not lost:
         return chosen
     laws = " and ".join(f"{e['name']} ({e['law']})" for e in lost)
     text = (
-        f"two methods disagree: another one found {laws}, and its model predicts whole recordings"
-        " less well; this one does not have it"
+        f"two methods disagree: the other one found {laws}, but its model predicts whole recordings"
+        " less well; this model does not include it"
     )
     return chosen.having(Finding(kind=Kind.METHOD, text=text))
 

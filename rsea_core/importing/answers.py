@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest
-from rsea_core.machine.rig import Rig
+from rsea_core.machine.rig import Rig, is_linear
 from rsea_core.recordings.column_map import ColumnSource, column_map, for_rig
 from rsea_core.recordings.recording import COLUMNS
 from rsea_core.recordings.units import factor_and_offset, unit_of_column
@@ -59,21 +59,29 @@ def parse_answer(text: str, known: Collection[str], rig: Rig | None = None) -> A
     if source.formula is None:
         _known(source.name, known, text)
     if source.unit is not None:
-        linear, counts = rig is not None and rig.axis == "linear", source.counts_per_rev or 1.0
+        linear, counts = is_linear(rig), source.counts_per_rev or 1.0
         factor_and_offset(source.unit, unit_of_column(target), counts, linear=linear)
     return Answer(source=source, name=source.name)
 
 
 def answer_text(
-    target: str, name: str, unit: str, *, sign: int = 1, side: str | None = None, scale: float = 1.0
-) -> str:
-    """A statement as it is typed on the command line."""
-    if side is None and scale == 1.0:
-        return f"--column {shlex.quote(f'{target}={name}:{unit}' + (':-1' if sign < 0 else ''))}"
-    more = f', side = "{side}"' if side is not None else ""
-    more += f", scale = {scale:.4g}" if scale != 1.0 else ""
-    more += ", sign = -1" if sign < 0 else ""
-    return f"--column '{target}={{ name = {json.dumps(name)}, unit = \"{unit}\"{more} }}'"
+    target: str, name: str, unit: str, *, sign: int = 1, side: str | None = None,
+    scale: float = 1.0, counts_per_rev: float | None = None,
+) -> str:  # fmt: skip
+    """A statement as it is typed on the command line of a shell."""
+    more = {"side": side, "scale": scale if scale != 1.0 else None}
+    more["counts_per_rev"] = counts_per_rev if unit == "count" else None
+    more = {key: value for key, value in more.items() if value is not None}
+    if not more:
+        return typed(f"{target}={name}:{unit}" + (":-1" if sign < 0 else ""))
+    entry = {"name": name, "unit": unit, **more, **({"sign": sign} if sign < 0 else {})}
+    text = ", ".join(f"{k} = {json.dumps(v, ensure_ascii=False)}" for k, v in entry.items())
+    return typed(f"{target}={{ {text} }}")
+
+
+def typed(statement: str) -> str:
+    """The option of a statement, quoted for a shell."""
+    return f"--column {shlex.quote(statement)}"
 
 
 def quoted(formula: str) -> list[str]:

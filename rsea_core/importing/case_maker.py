@@ -16,7 +16,7 @@ from rsea_core.importing.proposal import Proposal, answered, propose, why_no_tim
 from rsea_core.importing.rest import HELD_SPAN, usual_load, with_rest_as_zero
 from rsea_core.importing.streams.wraps import without_wraps, wraps_of
 from rsea_core.machine.inputs import POSITION_COMMAND
-from rsea_core.machine.rig import Rig
+from rsea_core.machine.rig import Rig, is_linear
 from rsea_core.recordings.column_map import ColumnSource
 from rsea_core.recordings.log_clock import unwrapped
 from rsea_core.recordings.readers.log import Log
@@ -229,7 +229,7 @@ def _load(raw: Mapping[str, NDArray], proposal: Proposal, rig: Rig | None) -> st
     if motor is None or load is None or rig is None:
         return usual_load(rig)
     spans = [
-        factor_and_offset(c.unit, "rad", c.counts_per_rev, linear=rig.axis == "linear")[0]
+        factor_and_offset(c.unit, "rad", c.counts_per_rev, linear=is_linear(rig))[0]
         * float(np.ptp(raw[c.name] if c.wrap is None else unwrapped(raw[c.name], c.wrap)))
         for c in (motor, load)
     ]

@@ -23,7 +23,7 @@ from rsea_core.importing.unit_evidence import (
     winding_laws,
 )
 from rsea_core.machine.inputs import POSITION_COMMAND
-from rsea_core.machine.rig import Rig
+from rsea_core.machine.rig import Rig, is_linear
 from rsea_core.recordings.column_map import counts_of
 from rsea_core.recordings.units import factor_and_offset, unit_of_column
 
@@ -95,7 +95,7 @@ class Posterior:
 def choices_of(name: str, target: str, evidence: NameEvidence, raw: NDArray, rig: Rig | None):
     """Every unit and side that a column of a target may have."""
     quantity = quantity_of(target)
-    linear = rig is not None and rig.axis == "linear"
+    linear = is_linear(rig)
     options = list(UNITS[quantity])
     if linear and not (target.startswith("motor") and (rig.gear_ratio or 1.0) != 1.0):
         options = list(LINEAR.get(quantity, options))
@@ -147,8 +147,9 @@ def _sided(name, target, unit, prior, rig: Rig | None, raw) -> list[Choice]:
     for side in sides:
         for counts in _counts(target, side, rig) if unit == "count" else (None,):
             try:
-                linear = rig is not None and rig.axis == "linear"
-                factor, _ = factor_and_offset(unit, unit_of_column(target), counts, linear=linear)
+                factor, _ = factor_and_offset(
+                    unit, unit_of_column(target), counts, linear=is_linear(rig)
+                )
             except Exception:  # a stated unit that does not fit this target
                 continue
             if side is not None:

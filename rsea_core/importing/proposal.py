@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
-from rsea_core.importing.answers import Answer, answer_text
+from rsea_core.importing.answers import Answer, answer_text, typed
 from rsea_core.importing.assignment import (
     alternatives,
     columns_by_derivative,
@@ -22,7 +22,7 @@ from rsea_core.importing.hypotheses import STATED, Choice, Posterior, best_hypot
 from rsea_core.importing.signs import signs_of
 from rsea_core.importing.streams.column_names import NameEvidence, name_evidence
 from rsea_core.importing.unit_evidence import Law
-from rsea_core.machine.rig import Rig
+from rsea_core.machine.rig import Rig, is_linear
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.column_map import ColumnSource
 from rsea_core.recordings.readers.log import LOG_TIME
@@ -34,10 +34,6 @@ SOURCES = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "curren
 EXACTLY = 1e-4  # of its scatter: no sensor follows an angle as closely
 LENGTHS = ("m", "mm", "um")  # what a scale counts in can only be seen beside another reading
 STAMPS = ("ts", "tstamp", "t_stamp")  # a time where it rises evenly, a spring's torque elsewhere
-UNKNOWN = (
-    "column {!r}: what is it? Its name says nothing that is known: --column NAME={name}:UNIT,"
-    " or reference={name} if it is not to be fitted"
-)
 COMPUTED = "computed, no sensor measured it; kept as a reference"
 
 
@@ -156,7 +152,7 @@ def propose(
     columns = tuple(c for c in _with_signs(best, whole, rig, evidence) if c.name not in made)
     moving = [n for n in unknown if np.ptp(whole[n]) > 0.0 and not _counts_rows(whole[n])]
     questions = [_question(c, best) for c in columns if c.asks]
-    questions += [UNKNOWN.format(n, name=n) for n in moving]
+    questions += [_unknown(n) for n in moving]
     return Proposal(
         columns=columns,
         references=(*goals, *moving, *made),
@@ -172,7 +168,7 @@ def _evidence(
 ) -> dict[str, NameEvidence]:
     """What each column's name says, with the unit that its owner or the file states."""
     own = {n: s.unit for n, s in stated.items() if s is not None and s.unit}
-    linear = rig is not None and rig.axis == "linear"
+    linear = is_linear(rig)
     return {n: name_evidence(n, own.get(n, units.get(n)), linear=linear) for n in raw}
 
 
@@ -300,20 +296,30 @@ def _reason(c: Choice, best: Posterior, e: NameEvidence, sign_known: bool) -> st
     return "; ".join(parts) or "by its name and the size of its numbers"
 
 
+def _unknown(name: str) -> str:
+    return (
+        f"column {name!r}: what is it? Its name says nothing that is known:"
+        f" {typed(f'READING={name}:UNIT')}, or {typed(f'reference={name}')} if it is not to be"
+        " fitted"
+    )
+
+
 def _question(c: ProposedColumn, best: Posterior) -> str:
     """What is not decided of a column, with the answers as they are typed."""
     rival = best.rivals.get(c.name)
     broken = _broken_law(c.target, best)
-    own = answer_text(c.target, c.name, c.unit, sign=c.sign, side=c.side)
+    known = {"sign": c.sign, "side": c.side, "counts_per_rev": c.counts_per_rev}
+    own = answer_text(c.target, c.name, c.unit, **known)
     if broken is not None:
         scale = float(f"{broken.missing_scale:.3g}")
-        fits = answer_text(c.target, c.name, c.unit, sign=c.sign, side=c.side, scale=scale)
+        fits = answer_text(c.target, c.name, c.unit, scale=scale, **known)
         return f"column {c.name!r}: {c.target}? In no unit: {broken.text}; state its scale: {fits}"
     text = f"column {c.name!r}: {c.target} in {c.unit} ({c.confidence:.0%})"
     differs = rival and (rival.unit, rival.target, rival.side) != (c.unit, c.target, c.side)
     if differs and best.confidence[c.name] < ASK_BELOW:
         side = "" if rival.side is None else f" on the {rival.side} side"
-        other = answer_text(rival.target, c.name, rival.unit, sign=c.sign, side=rival.side)
+        known |= {"side": rival.side, "counts_per_rev": rival.counts_per_rev}
+        other = answer_text(rival.target, c.name, rival.unit, **known)
         return f"{text} or {rival.target} in {rival.unit}{side}? {own}, or {other}"
     if c.sign_known:
         return f"{text}: nothing else in the log confirms it; if it is right: {own}"

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.importing.proposal import Proposal
-from rsea_core.machine.rig import Rig
+from rsea_core.machine.rig import Rig, is_linear
 from rsea_core.recordings.case import noise_floor
 from rsea_core.recordings.initial_speed import start_speeds
 from rsea_core.recordings.recording import Recording
@@ -28,7 +28,7 @@ def with_rest_as_zero(proposal: Proposal, raw: Mapping[str, NDArray], rig: Rig |
     column = proposal.column("load_angle_rad")
     if rig is None or rig.parts != ("load",) or not rig.load_mass_kg or column is None:
         return proposal
-    if rig.axis == "linear":
+    if is_linear(rig):
         return proposal
     factor, _ = factor_and_offset(column.unit, "rad", column.counts_per_rev or 1.0)
     angle = factor * raw[column.name]

@@ -303,3 +303,8 @@ def _toml(value: object) -> str:
     if isinstance(value, tuple):
         return "[" + ", ".join(_toml(item) for item in value) + "]"
     return repr(float(value))
+
+
+def is_linear(rig: Rig | None) -> bool:
+    """Whether the axis is known to be linear: 1 m is written as 1 rad and 1 N as 1 Nm."""
+    return rig is not None and rig.axis == "linear"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from rsea_core.errors import RecordingError
 from rsea_core.files.toml_tables import nearest, number, require_known
 from rsea_core.machine.inputs import POSITION_COMMAND
-from rsea_core.machine.rig import Rig
+from rsea_core.machine.rig import Rig, is_linear
 
 SOURCE_KEYS = (
     "name", "formula", "unit", "sign", "scale", "zero", "side", "counts_per_rev", "topic", "wrap",
@@ -139,7 +139,7 @@ def for_rig(columns: ColumnMap, rig: Rig) -> ColumnMap:
         if s.counts_per_rev is None else s
         for s in columns.sources
     )  # fmt: skip
-    return replace(columns, sources=sources, linear=rig.axis == "linear")
+    return replace(columns, sources=sources, linear=is_linear(rig))
 
 
 def counts_of(rig: Rig, target: str, side: str | None) -> float | None:

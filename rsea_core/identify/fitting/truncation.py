@@ -49,7 +49,7 @@ def truncate(
             kept.append(r)
             continue
         rows = int(limit / steps)
-        kept.append(_first(r, rows))
+        kept.append(rows_between(r, 0, rows))
         text = (
             f"only its first {rows * r.sample_time_s:.4g} s of"
             f" {r.rows * r.sample_time_s:.4g} s were fitted: {reason}"
@@ -68,6 +68,15 @@ def _level(sizes: Sequence[float], most: float) -> float:
     return float("inf")
 
 
-def _first(r: Recording, rows: int) -> Recording:
-    columns = {name: read_only(values[:rows].copy()) for name, values in r.columns.items()}
-    return replace(r, columns=columns)
+def rows_between(r: Recording, first: int, end: int) -> Recording:
+    """The rows from `first` up to `end` of a recording, of its log as well, from time 0 on."""
+    columns = {name: read_only(values[first:end].copy()) for name, values in r.columns.items()}
+    begin, last = columns["time_s"][0], columns["time_s"][-1]
+    columns["time_s"] = read_only(columns["time_s"] - begin)
+    logged = r.logged
+    if logged is not None:
+        reach = 0.5 * r.sample_time_s
+        kept = (logged["time_s"] >= begin - reach) & (logged["time_s"] <= last + reach)
+        logged = {name: read_only(values[kept]) for name, values in logged.items()}
+        logged["time_s"] = read_only(logged["time_s"] - begin)
+    return replace(r, columns=columns, logged=logged)

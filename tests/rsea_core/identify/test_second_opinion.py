@@ -10,7 +10,12 @@ import rsea_core.identify.window_diagnosis as window_diagnosis
 from rsea_core.effects.drive_saturation import DriveSaturation
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.gear_load_friction import GearLoadFriction
-from rsea_core.identify.diagnose import WINDOWS_FAILED, diagnose_machine, held_out_error
+from rsea_core.identify.diagnose import (
+    WINDOWS_FAILED,
+    diagnose_machine,
+    held_out_error,
+    with_disagreement,
+)
 from rsea_core.identify.multistep.log_nuisances import MESH_DAMPER
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.window_diagnosis import CURTAILED
@@ -54,6 +59,18 @@ def test_free_runs_replace_windows_only_where_they_predict_clearly_better(
     monkeypatch.setattr(f"{HERE}.diagnose_windows", lambda *_, **__: opinions["windows"])
     monkeypatch.setattr(f"{HERE}.diagnose_free_runs", lambda *_, **__: opinions["free runs"])
     assert diagnose_machine(case) is opinions[taken]
+
+
+@pytest.mark.parametrize(("confidence", "is_noted"), [(0.45, True), (0.1, False)])
+def test_a_law_that_the_model_taken_does_not_have_is_noted_and_a_nearest_name_is_not(
+    confidence, is_noted
+):
+    cogging = {"name": "motor-cogging", "law": "84 per turn", "confidence": confidence}
+    document = {"effects": [], "findings": []}
+    taken = Diagnosis(document=document, model=None, conclusion=None)
+    other = replace(taken, document=document | {"effects": [cogging]})
+    noted = " ".join(with_disagreement(taken, other).document["findings"])
+    assert ("motor-cogging (84 per turn)" in noted) is is_noted
 
 
 def test_of_two_unexplained_opinions_of_a_bench_the_one_that_predicts_better_stands(

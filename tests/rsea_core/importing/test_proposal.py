@@ -1,10 +1,12 @@
 """Names and numbers decide what a column is; what they leave open is a question, never a guess."""
 
+import shlex
+
 import numpy as np
 import pytest
 
 from rsea_core.errors import RecordingError
-from rsea_core.importing.answers import parse_answer
+from rsea_core.importing.answers import answer_text, parse_answer
 from rsea_core.importing.case_text import columns_text
 from rsea_core.importing.proposal import answered, propose
 from rsea_core.importing.streams.column_names import name_evidence
@@ -99,6 +101,25 @@ def test_counts_of_an_encoder_are_those_of_the_rig_file():
     assert parse_answer("load_angle_rad=x_scale:mm", data, rig).source.unit == "mm"
     with pytest.raises(RecordingError, match='unit "mm" is no unit of rad'):
         parse_answer("load_angle_rad=x_scale:mm", data, RIG)
+
+
+@pytest.mark.parametrize(
+    "known",
+    [
+        {}, {"sign": -1}, {"side": "load"}, {"scale": 0.5, "sign": -1},
+        {"counts_per_rev": 4096.0, "side": "load"},
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("name", ["enc", "pos 1: raw", "it's"])
+def test_an_answer_as_it_is_proposed_is_read_back_as_it_was_meant(name, known):
+    unit = "count" if "counts_per_rev" in known else "rad"
+    option, statement = shlex.split(answer_text("motor_angle_rad", name, unit, **known))
+    assert option == "--column"
+    source = parse_answer(statement, [name]).source
+    found = (source.name, source.unit, source.sign, source.side, source.scale)
+    usual = {"sign": 1, "side": None, "scale": 1.0} | known
+    assert found == (name, unit, usual["sign"], usual["side"], usual["scale"])
+    assert source.counts_per_rev == known.get("counts_per_rev")
 
 
 def test_what_no_name_tells_is_a_question_and_an_answer_settles_it():

@@ -1,12 +1,15 @@
 """The slips of a log are noticed, a machine as its rig file says has none."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from rsea_core.importing.doctor.health import health
 from rsea_core.importing.doctor.slip_catalogue import CATALOGUE, case_slips, try_slips
 from rsea_core.recordings.case import Case
+from rsea_core.recordings.finding import Kind
 from tests.rsea_core.recordings.test_consistency_checks import RIG, recorded
 
 CASE = Case(name="bench", folder=Path(), rig=RIG, recordings=(recorded(),))
@@ -14,6 +17,16 @@ CASE = Case(name="bench", folder=Path(), rig=RIG, recordings=(recorded(),))
 
 def test_a_consistent_recording_shows_no_slip():
     assert case_slips(CASE) == ()
+
+
+def test_a_column_is_late_where_most_recordings_show_it_and_not_where_one_does():
+    """A slow motion alone has a phase by friction that looks like a delay."""
+    right = CASE.recordings[0]
+    late = {n: np.roll(v, 60) if n == "torque_Nm" else v for n, v in right.columns.items()}
+    late = replace(right, columns=late)
+    for recordings, reported in (((late,) * 2, True), ((late, right, right), False)):
+        found = case_slips(replace(CASE, recordings=recordings))
+        assert any(f.kind is Kind.CLOCK for f in found) is reported
 
 
 def test_most_of_the_forty_slips_are_noticed_each_by_one_line():
