@@ -60,7 +60,8 @@ def _lines(path: Path, text: str) -> list:
         try:
             found.append(json.loads(line))
         except (ValueError, RecursionError) as problem:
-            raise RecordingError(f"{path}: line {k} is not {KIND}: {problem}") from problem
+            why = getattr(problem, "msg", "nested too deeply")
+            raise RecordingError(f"{path}: line {k} is not {KIND}: {why}") from problem
     return found
 
 
