@@ -54,7 +54,8 @@ def _rig() -> dict:
     recording = closed(RECORDING_KEYS, file=TEXT, role=roles, load=one_of(*LOADS), columns=TABLE,
                        description=TEXT)  # fmt: skip
     return closed(RIG_TABLES, ["rig"], rig=_rig_table(), tolerances=_tolerances(),
-                  anchor=_anchor(), recording=list_of(recording), columns=TABLE)  # fmt: skip
+                  anchor=_anchor(), term=TABLES, recording=list_of(recording),
+                  columns=TABLE)  # fmt: skip
 
 
 def _model() -> dict:

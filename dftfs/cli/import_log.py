@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
-from dftfs.cli.import_values import known_values, refuse, window_of
+from dftfs.cli.import_values import known_values, refuse, stated_rig, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
 from rsea_core.errors import RigError
@@ -27,7 +27,6 @@ from rsea_core.importing.case_maker import (
 )
 from rsea_core.importing.case_text import recording_text
 from rsea_core.importing.log_columns import channels_of
-from rsea_core.machine.rig import Rig
 from rsea_core.recordings.quality_checks import data_warnings
 from rsea_core.recordings.recording import ROLES
 
@@ -72,7 +71,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise OutputError(f"{out} is a file; a folder has to be written there")
     if out.exists() and any(out.iterdir()) and not arguments.force:
         raise OutputError(f"{out} exists and is not empty; --force writes into it")
-    rig = _rig(arguments.rig)
+    rig, terms = stated_rig(arguments.rig)
+    options = replace(options, terms=terms)
     known = known_values(arguments.model, arguments.joint, arguments.spring)
     rig = completed(rig, known)
     columns = labelled_columns(groups[0], options)
@@ -93,12 +93,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _ask(question: str) -> str:
     return input(f"{question} [Enter: as proposed, or NAME=COLUMN:UNIT[:SIGN]] ")
-
-
-def _rig(given: str | None) -> Rig | None:
-    if given is None:
-        return None
-    return Rig.from_toml(given) if given.endswith(".toml") else Rig.preset(given)
 
 
 def _add_to_case(groups, options: ImportOptions) -> int:

@@ -6,8 +6,12 @@ from pathlib import Path
 from typing import NoReturn
 
 from dftfs.errors import DftfsError
+from rsea_core.errors import RigError
+from rsea_core.files.toml_tables import read_toml
 from rsea_core.importing.robot_model import rig_values
+from rsea_core.machine.rig import Rig
 from rsea_core.recordings.recording import ROLES
+from rsea_core.terms.known import KnownTerm, known_terms
 
 MOST_ASKED = 8
 
@@ -56,3 +60,13 @@ def known_values(
         stiffness = closed_form_design(load_design(spring)).stiffness_Nm_per_rad
         known |= {"spring_stiffness_Nm_per_rad": (stiffness, f"design {spring}, rod model")}
     return known
+
+
+def stated_rig(given: str | None) -> tuple[Rig | None, tuple[KnownTerm, ...]]:
+    """The rig of a preset's name or a file, and the physics that the file states beside it."""
+    if given is None:
+        return None, ()
+    if not given.endswith(".toml"):
+        return Rig.preset(given), ()
+    rig = Rig.from_toml(given)
+    return rig, known_terms(read_toml(given, RigError), rig, given)

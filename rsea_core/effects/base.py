@@ -189,6 +189,8 @@ class Term(ABC):
         How it is drawn; None where a number says it all.
     relevant : RelevantSize or None
         The size at which it would matter, of its first law.
+    known_form : str or None
+        The variant whose further values stay free where a rig file states the effect's level.
     form_spread : float
         Relative standard deviation of its figures from what recordings rarely show of the effect.
     """
@@ -204,6 +206,7 @@ class Term(ABC):
     figure_units: ClassVar[Mapping[str, str]] = {}
     curve: ClassVar = None
     relevant: ClassVar = None
+    known_form: ClassVar[str | None] = None
     form_spread: ClassVar[float] = 0.0
 
     def __post_init__(self):

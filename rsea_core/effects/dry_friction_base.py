@@ -78,6 +78,7 @@ class DryFriction(Term):
         If a parameter is outside its bounds, or friction is both a stop's and on bristles.
     """
 
+    known_form: ClassVar[str] = "presliding"
     other_joint: ClassVar[str]  # the one that a rigid body moves together with this one
 
     def __post_init__(self):

@@ -209,6 +209,7 @@ class Law:
     figure_values: Mapping[str, str] = field(default_factory=dict)
     only: str | None = None  # file of the one recording that it acts on
     nuisance: bool = False  # part of every hypothesis, of the experiment and not of the machine
+    known: bool = False  # a nuisance that is physics: the rig file states it
     own_form_spread: float | None = None  # in place of its class's, where it assumes more
 
     @property

@@ -19,6 +19,7 @@ from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, MESH_DAMPE
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_table, summary
+from rsea_core.identify.result.known_values import known_as_terms, known_values
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
 from rsea_core.identify.whole_runs.single_zeros import zeros_of
 from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
@@ -82,8 +83,10 @@ def diagnose_windows(
         if p.key.startswith("contact_"):
             value = conclusion.model_values()[0][p.key]
             contact[p.key] = value - p.value if p.additive else value / p.value
+    _, values = conclusion.model_values()
+    known = known_as_terms(conclusion, conclusion.model_fit.hypothesis, values)
     model = FoundModel(
-        rig=rig, contact=contact, laws=laws, ambient_C=conclusion.ambient(),
+        rig=rig, terms=known, contact=contact, laws=laws, ambient_C=conclusion.ambient(),
         initial_rises_K=heat_left(problem, laws, rig.terminal_resistance_ohm or 1.0),
         rest_rad=rest_of(problem, laws, rig.spring_stiffness_Nm_per_rad or 0.0),
         command_between_rows="linear" if problem.timing.linear else "held",
@@ -103,7 +106,7 @@ def _model_laws(conclusion: WindowVerdict) -> tuple:
 
 def _kept(law, values) -> bool:
     """Whether a law belongs into a model: clocks and drifts are the log's, and a zero is none."""
-    if law.effect in OF_THE_LOG or (law.nuisance and law.only is not None):
+    if law.known or law.effect in OF_THE_LOG or (law.nuisance and law.only is not None):
         return False
     return not law.nuisance or any(value != 0.0 for value in values.values())
 
@@ -237,7 +240,7 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
     std, at = conclusion.spread.std, len(conclusion.problem.nominals)
     for law, values in zip(conclusion.fit.hypothesis.laws, conclusion.laws, strict=True):
         count = sum(p.scale > 0.0 for p in law.unknowns)
-        if law.nuisance and count == 1:
+        if law.nuisance and not law.known and count == 1:
             ((_, value),) = values.items()
             size = std[at] * law.unknowns[0].scale
             text = _nuisance_text(law, value, size, _span(conclusion))
@@ -264,6 +267,15 @@ def findings_of(conclusion: WindowVerdict) -> list[Finding]:
                 f" value ({p.value:.4g} -> {conclusion.nominal[p.key]:.4g}): is the file right?"
             )
             found.append(Finding(kind=Kind.METHOD, text=text))
+    found += [
+        Finding(
+            kind=Kind.METHOD,
+            text=f"{v.key} ended {abs(v.moved):.1f} of its tolerances from the rig file's value"
+            f" ({v.stated:.4g} -> {v.found:.4g} {v.unit}): is the file right?",
+        )
+        for v in known_values(conclusion)
+        if abs(v.moved) > max(SURE, 2.0 * v.unsure)
+    ]
     found += [Finding(kind=Kind.METHOD, text=text) for text in _fitted_of_held_out(conclusion)]
     if conclusion.unknown_torque is not None:
         text = f"the model leaves {conclusion.unknown_torque}: smaller effects cannot be detected"

@@ -132,7 +132,7 @@ def late_command(judged) -> dict | None:
     if any(r.command_name == POSITION_COMMAND for r in judged.case.identification):
         return None
     for j, law in enumerate(judged.fit.hypothesis.laws):
-        if law.kind is not DriveDelay:
+        if law.kind is not DriveDelay or law.unknowns[0].log:  # the rig file states it
             continue
         delay = judged.laws[j]["delay_s"]
         at = judged.index_of(j)

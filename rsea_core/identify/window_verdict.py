@@ -38,6 +38,7 @@ from rsea_core.identify.multistep.criteria import (
 from rsea_core.identify.multistep.horizons import relative_error
 from rsea_core.identify.multistep.kalman_filter import huber_squares
 from rsea_core.identify.result.conclusion import Conclusion
+from rsea_core.identify.result.known_values import moved_tolerances
 from rsea_core.identify.window_confidence import step_confidence, step_presence
 from rsea_core.identify.window_findings import stands
 from rsea_core.identify.window_fit import (
@@ -137,8 +138,7 @@ class WindowVerdict(Conclusion):
             there = step_presence(self.found, 0, self.held_out) >= 0.5 and self._shown(first)
             if there or self.delayed is not None:
                 return "missing-physics"
-            much = any(_gains_much(step) for step in self.found.steps)
-            return "unexplained" if much else "insufficient-data"
+            return "unexplained" if any(map(_gains_much, self.found.steps)) else "insufficient-data"
         if self.unbalance is not None or self.delayed is not None:
             return "missing-physics"
         if self.dependent or self.unaccounted:
@@ -150,7 +150,7 @@ class WindowVerdict(Conclusion):
         return shown(self._figures(j)) or sizes_shown(law, first, self.fit.x, self.spread)
 
     def _rig_is_right(self) -> bool:
-        return bool(np.all(np.abs(self.fit.x[: len(self.problem.nominals)]) < 0.5))
+        return bool(np.all(np.abs(moved_tolerances(self)) < 0.5))
 
     def _unknown_shape(self) -> Shape | None:
         """A torque of unknown shape that says more than what has a name.

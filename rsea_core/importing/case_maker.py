@@ -22,6 +22,7 @@ from rsea_core.recordings.log_clock import unwrapped
 from rsea_core.recordings.readers.log import Log
 from rsea_core.recordings.readers.open_log import is_folder_of_logs, logs_of_folder, open_log
 from rsea_core.recordings.units import factor_and_offset
+from rsea_core.terms.known import KnownTerm
 
 ROW_TIME = "row time [s]"
 
@@ -45,6 +46,8 @@ class ImportOptions:
         Windows of a log [s since its first row] that are the recordings.
     answers : tuple of str
         As `parse_answer` reads them.
+    terms : tuple of KnownTerm
+        Those of the rig's file.
     """
 
     out: Path
@@ -55,6 +58,7 @@ class ImportOptions:
     role: str = "identification"
     parts: tuple[tuple[float, float, str | None], ...] = ()
     answers: tuple[str, ...] = ()
+    terms: tuple[KnownTerm, ...] = ()
 
 
 def groups_of_paths(
@@ -272,5 +276,5 @@ def case_text(
     shown = [c.target for c in proposal.columns]
     shown += ["torque_Nm"] if "spring_stiffness_Nm_per_rad" in known else []
     parts = rig.parts if rig else parts_of(shown)
-    is_servo = proposal.column(POSITION_COMMAND) is not None
-    return rig_text(rig, options.out.name, parts, text, listed, known, is_servo=is_servo)
+    more = {"is_servo": proposal.column(POSITION_COMMAND) is not None, "terms": options.terms}
+    return rig_text(rig, options.out.name, parts, text, listed, known, **more)

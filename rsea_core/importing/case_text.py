@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rsea_core.importing.proposal import ProposedColumn
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import PARTS, QUANTITIES, Rig
+from rsea_core.terms.known import KnownTerm
 
 NEEDED = {
     "supply_voltage_V": "volts from duty",
@@ -28,6 +29,12 @@ NEEDED = {
     "torque_sensor_noise_Nm": "how far the torque can be trusted",
     "current_sensor_noise_A": "how far the current can be trusted",
 }
+FRICTION_HINT = """\
+# Known dry friction is a term (gear-friction: at the motor; load-friction: at the load):
+# [[term]]
+# effect = "gear-friction"
+# coulomb_Nm = ...
+"""
 PLACEHOLDER = "# {key} = ...  # {why}"
 
 
@@ -91,6 +98,7 @@ def rig_text(
     known: Mapping[str, tuple[float, str]],
     *,
     is_servo: bool = False,
+    terms: Sequence[KnownTerm] = (),
 ) -> str:
     """The whole rig file.
 
@@ -98,6 +106,8 @@ def rig_text(
     ----------
     known : mapping of key to (value, where it comes from)
         Values of a robot model, where there is no rig.
+    terms : sequence of KnownTerm
+        Those of the rig's file.
     """
     lines = ["# Made by `dftfs import`. Values marked ... are missing: fill in what you know."]
     if rig is not None:
@@ -111,7 +121,9 @@ def rig_text(
         lines += [f"{key} = {value!r}  # {source}" for key, (value, source) in known.items()]
     missing = [key for key in missing_values(rig, parts) if key not in known]
     lines += [PLACEHOLDER.format(key=key, why=NEEDED[key]) for key in missing]
-    lines += ["", *tail, columns.rstrip(), ""]
+    lines += ["", *(term.to_toml() for term in terms)]
+    lines += [FRICTION_HINT] if rig is None else []
+    lines += [*tail, columns.rstrip(), ""]
     lines += [recording_text(r) for r in recordings]
     return "\n".join(lines)
 

@@ -28,11 +28,11 @@ PARTS = ("drive", "gear", "spring", "load")
 AXES = ("rotary", "linear")
 DRY_FRICTION = re.compile("coulomb|friction|stribeck|stiction", re.I)
 NO_DRY_FRICTION = (
-    "the machine of a rig file has no dry friction; a diagnosis reports what recordings show, and a"
-    " simulation takes it as an effect"
+    'dry friction that is known is a term: write [[term]] effect = "gear-friction" (at the motor)'
+    ' or "load-friction" with coulomb_Nm = ...'
 )
 SERVOS = ("angle", "angle-and-rate")
-TABLES = ("rig", "tolerances", "anchor", "recording", "columns")
+TABLES = ("rig", "tolerances", "anchor", "term", "recording", "columns")
 CONSTANT_MISMATCH = 0.02  # k_t and k_e further apart than this are reported
 MISMATCH_HINT = "rms and peak, or phase and line, conventions mixed?"
 

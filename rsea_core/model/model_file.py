@@ -17,24 +17,14 @@ Numbers are written so that reading them back gives the same ones to the bit.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
-from rsea_core.effects.registry import LAWS, SpringCurve, Term
+from rsea_core.effects.registry import Term
 from rsea_core.effects.variant import Law
 from rsea_core.errors import RigError, RseaError, TermError
 from rsea_core.files.text_files import write_whole
-from rsea_core.files.toml_tables import (
-    nearest,
-    number,
-    read_toml,
-    require_known,
-    table,
-    toml_string,
-    word,
-)
+from rsea_core.files.toml_tables import number, read_toml, require_known, table
 from rsea_core.machine.rig import Rig
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.diagnosed_effects import (
@@ -46,10 +36,11 @@ from rsea_core.model.diagnosed_effects import (
     map_laws,
     read_laws,
 )
+from rsea_core.terms.tables import term_from_table, term_to_toml
 
 TABLES = ("rig", "tolerances", "anchor", "term", "found", "law")
+OF_A_CASE = ("recording", "columns")  # of a rig file, which a model file may be
 AMBIENT_C = 25.0
-ONSETS = ("negative_contact_onset_rad", "positive_contact_onset_rad")  # of a spring curve
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,7 +110,7 @@ class ModelFile:
 
 
 def read_model_file(path: str | Path) -> ModelFile:
-    """What a `model.toml` holds; a `rig.toml` without recordings is one too.
+    """What a `model.toml` holds; the `rig.toml` of a case is one too.
 
     Raises
     ------
@@ -128,7 +119,7 @@ def read_model_file(path: str | Path) -> ModelFile:
         message names file, term and key.
     """
     tables = read_toml(path, TermError)
-    require_known(tables, TABLES, str(path), TermError)
+    require_known(tables, (*TABLES, *OF_A_CASE), str(path), TermError)
     rest = {key: tables.pop(key) for key in ("term", "law", "found") if key in tables}
     listed = rest.get("term", [])
     if not isinstance(listed, list):
@@ -158,7 +149,7 @@ def read_model_file(path: str | Path) -> ModelFile:
 
 
 def read_model(path: str | Path) -> ActuatorModel:
-    """The model of a `model.toml`; a `rig.toml` without recordings is one too.
+    """The model of a `model.toml`; the `rig.toml` of a case is one too.
 
     Laws of a diagnosis become terms; what a model cannot hold of them is in
     `read_model_file(path).notes`.
@@ -185,64 +176,3 @@ def write_model(model: ActuatorModel, path: str | Path) -> Path:
 def model_to_toml(model: ActuatorModel) -> str:
     """The text of a `model.toml`."""
     return "\n".join([model.rig.to_toml(), *map(term_to_toml, model.terms)])
-
-
-def term_to_toml(term: Term) -> str:
-    """The [[term]] table of one term."""
-    lines = ["[[term]]", f'effect = "{term.effect}"', f'law = "{term.law}"']
-    lines += [f"{name} = {_toml(value)}" for name, value in _entries(term).items()]
-    return "\n".join(lines) + "\n"
-
-
-def term_from_table(table: object, position: int) -> Term:
-    """The term of one [[term]] table; its position in the file is for messages.
-
-    Raises
-    ------
-    TermError
-        For an unknown effect, law or key (with the nearest known one), a missing or
-        impossible value.
-    """
-    where = f"term {position}"
-    if not isinstance(table, Mapping) or not isinstance(table.get("effect"), str):
-        raise TermError(f"{where}: needs effect, the name of one of {', '.join(LAWS)}")
-    values = dict(table)
-    effect = values.pop("effect")
-    if effect not in LAWS:
-        raise TermError(f"{where}: unknown effect {effect!r}; {nearest(effect, LAWS)}")
-    where = f"{where} ({effect})"
-    law = word(values.pop("law", next(iter(LAWS[effect]))), f"{where}: law", TermError)
-    if law not in LAWS[effect]:
-        raise TermError(f"{where}: unknown law {law!r}; {nearest(law, LAWS[effect])}")
-    kind = LAWS[effect][law]
-    known = {f.name: f for f in fields(kind) if f.name != "contact_onset_rad"}
-    if kind is SpringCurve:
-        known |= dict.fromkeys(ONSETS)
-    require_known(values, known, where, TermError)
-    for name, value in values.items():
-        if known[name] is not None and "bounds" in known[name].metadata:
-            values[name] = number(value, f"{where}: {name}", TermError)
-    if kind is SpringCurve:
-        values["contact_onset_rad"] = tuple(values.pop(name, None) for name in ONSETS)
-    try:
-        return kind(**values)
-    except (TypeError, ValueError) as problem:
-        needed = [f.name for f in fields(kind) if f.default is f.default_factory]
-        missing = ", ".join(name for name in needed if name not in values)
-        raise TermError(f"{where}: {f'lacks {missing}' if missing else problem}") from None
-
-
-def _entries(term: Term) -> dict:
-    found = {f.name: getattr(term, f.name) for f in fields(term)}
-    if isinstance(term, SpringCurve):
-        onsets = zip(ONSETS, found.pop("contact_onset_rad"), strict=True)
-        found |= {name: onset for name, onset in onsets if onset is not None}
-    return found
-
-
-def _toml(value: object) -> str:
-    if isinstance(value, str):
-        return toml_string(value)
-    if isinstance(value, np.ndarray):
-        return "[" + ", ".join(repr(float(item)) for item in value) + "]"
-    return repr(float(value))

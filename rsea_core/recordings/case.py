@@ -24,6 +24,7 @@ from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.column_map import ColumnMap, column_map, for_rig, merged
 from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import COLUMNS, RESPONSES, ROLES, Recording, read_recording
+from rsea_core.terms.known import KnownTerm, known_terms
 
 FARTHEST_s, CLOSEST_s = 0.4, 5e-6  # rows of a motion
 DEFLECTION = "spring_deflection_rad"
@@ -58,12 +59,15 @@ class Case(BriefRepr):
     folder : Path
     rig : Rig
     recordings : tuple of Recording
+    known : tuple of KnownTerm
+        Physics that the file states beside the rig's values.
     """
 
     name: str
     folder: Path
     rig: Rig
     recordings: tuple[Recording, ...]
+    known: tuple[KnownTerm, ...] = ()
 
     @property
     def identification(self) -> tuple[Recording, ...]:
@@ -112,7 +116,7 @@ def read_case(folder: str | Path, report: Callable[[str], None] | None = None) -
 
     Raises
     ------
-    RecordingError, RigError
+    RecordingError, RigError, TermError
         If anything breaks the file contract: one line naming file, key or column, and row.
     """
     folder = Path(folder)
@@ -121,14 +125,13 @@ def read_case(folder: str | Path, report: Callable[[str], None] | None = None) -
     path = folder / "rig.toml"
     tables = read_toml(path, RigError)
     rig = Rig.from_tables(tables, where=str(path)).with_both_constants()
-    listed = _recording_tables(tables, path)
-    shared = tables.get("columns")
-    recordings = tuple(
-        _recording(folder, rig, t, f"{path}: recording {k}", shared, report) for k, t in listed
-    )
+    known, listed = known_terms(tables, rig, str(path)), _recording_tables(tables, path)
+    where, common = f"{path}: recording", (tables.get("columns"), report)
+    recordings = tuple(_recording(folder, rig, t, f"{where} {k}", *common) for k, t in listed)
     if not any(r.role == "identification" for r in recordings):
         raise RecordingError(f'{path}: no recording has the role "identification"')
-    return Case(name=folder.resolve().name, folder=folder, rig=rig, recordings=recordings)
+    name = folder.resolve().name
+    return Case(name=name, folder=folder, rig=rig, recordings=recordings, known=known)
 
 
 def read_test(folder: str | Path, rig: Rig) -> tuple[InputRecording, ...]:

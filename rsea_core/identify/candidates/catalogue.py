@@ -3,6 +3,7 @@
 from collections.abc import Iterable
 
 from rsea_core.effects.base import Port, Term
+from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.load_friction_angle import LoadFrictionAngle
@@ -62,6 +63,13 @@ def indistinguishable(law: Law, rig: Rig) -> list[str]:
 def rivals_of(law: Law, others: Iterable[tuple[Law, float]]) -> list[tuple[Law, float]]:
     """Laws and their gains, without laws of an effect that generalises the law's own."""
     return [(w, gain) for w, gain in others if w.kind is None or w.kind.generalises != law.effect]
+
+
+def known_laws(case: Case) -> tuple[Law, ...]:
+    """The laws that the rig file states; a delay of the command is the log's nuisance."""
+    known = [k for k in case.known if k.term.effect != DriveDelay.effect]
+    typical = typical_magnitudes_of(case) if known else None
+    return tuple(k.law(typical) for k in known)
 
 
 def _kinds() -> list[type[Term]]:

@@ -17,6 +17,7 @@ import rsea_core.machine.plant as mp
 from rsea_core.effects.variant import PLANT, Law, RunConditions, TrialMachine
 from rsea_core.engines.fixed_step.replay import CHANNELS, Numbers, Replay
 from rsea_core.errors import InputError, RecordingError, RigError
+from rsea_core.identify.candidates.catalogue import known_laws, of_one_body
 from rsea_core.identify.candidates.rig_parameters import Nominal, nominals, write_nominal
 from rsea_core.identify.fitting.innovations import ReplayTask, replay_innovations
 from rsea_core.identify.fitting.predictions import Windows, predict_readings, run_machines
@@ -75,7 +76,7 @@ class Hypothesis:
 
 
 class Problem:
-    """The prepared recordings of a case, and what is free.
+    """The prepared recordings of a case, what is free, and the `nominal` machine of its file.
 
     Parameters
     ----------
@@ -88,6 +89,7 @@ class Problem:
         self.nominals: tuple[Nominal, ...] = nominals(case)
         self.base = {n.key: n.value for n in self.nominals}
         self.model = ActuatorModel(case.rig)
+        self.nominal = Hypothesis(laws=known_laws(case))
         began, self.prepared = 0.0, []
         past: list[NDArray] = []
         ambient = None
@@ -250,8 +252,16 @@ class Problem:
         )
         write_nominal(nominal, self.base, machine, self.case.rig)
         for law, values in zip(hypothesis.laws, laws, strict=True):
-            law.write(values, machine, prepared.where)
+            if self.acts(law, hypothesis):
+                law.write(values, machine, prepared.where)
         return machine
+
+    def acts(self, law: Law, hypothesis: Hypothesis) -> bool:
+        """Whether a law acts: a found one takes the place of the same effect as it was stated."""
+        if not law.known:
+            return True
+        found, body = set(hypothesis.effects), of_one_body(self.case.rig)
+        return law.effect not in (found | body if found & body else found)
 
     def innovations(
         self,

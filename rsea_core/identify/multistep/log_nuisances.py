@@ -15,6 +15,7 @@ from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.sensor_base import writes_reading
 from rsea_core.effects.variant import Law, RunConditions, Unknown, writes_numbers
+from rsea_core.identify.candidates.catalogue import known_laws
 from rsea_core.identify.multistep.experiment import DELAY_STEP_ROWS, VELOCITIES
 from rsea_core.machine.inputs import COMMANDS, POSITION_COMMAND
 from rsea_core.machine.rig import Rig
@@ -39,7 +40,12 @@ CLOCKS = ("motor_angle_rad", "load_angle_rad", "torque_Nm")
 
 
 def nuisances(case: Case) -> tuple[Law, ...]:
-    """The experiment's own free values, in every hypothesis: the drive's offset and delay."""
+    """What every hypothesis has: laws that the rig file states, the drive's offset and delay."""
+    return (*known_laws(case), *_of_experiment(case))
+
+
+def _of_experiment(case: Case) -> tuple[Law, ...]:
+    """The experiment's own free values."""
     driven = [r for r in case.identification if r.command_name in COMMANDS]
     clocks = tuple(_clock(c) for c in CLOCKS if all(c in r.responses for r in case.identification))
     lags = (*_lags(case), *_ratio_rounding(case))
@@ -56,9 +62,8 @@ def nuisances(case: Case) -> tuple[Law, ...]:
         name="delay_s", unit="s", low=0.0, high=LONGEST_DELAY_ROWS * row,
         scale=DELAY_STEP_ROWS * row, prior=(SERVO_DELAY_ROWS if servo else DELAY_PRIOR_ROWS) * row,
     )  # fmt: skip
-    stated, start = case.rig.servo_delay_s if servo else None, 0.0
+    (stated, share), start = _stated_delay(case, servo), 0.0
     if stated:
-        share = dict(case.rig.tolerances).get("servo_delay_s", TOLERANCES["servo_delay_s"])
         delay = replace(delay, log=True, low=1e-3 * row, scale=0.2 * share, prior=share)
         start = stated
     late = Law(
@@ -66,6 +71,15 @@ def nuisances(case: Case) -> tuple[Law, ...]:
         write=writes_numbers(DriveDelay), unknowns=(delay,), starts=((start,),), nuisance=True,
     )  # fmt: skip
     return (DriveOffset.nuisance(max(span, full), OFFSET_PRIOR), late, *clocks, *lags)
+
+
+def _stated_delay(case: Case, servo: bool) -> tuple[float | None, float]:
+    """The delay of commands that the rig file states, and its relative tolerance."""
+    if servo:
+        share = dict(case.rig.tolerances).get("servo_delay_s", TOLERANCES["servo_delay_s"])
+        return case.rig.servo_delay_s, share
+    known = (k for k in case.known if k.term.effect == DriveDelay.effect)
+    return next(((k.term.delay_s, k.tolerance) for k in known), (None, 1.0))
 
 
 def offset_drifts(case: Case) -> tuple[Law, ...]:

@@ -25,8 +25,9 @@ from rsea_core.identify.fitting.problem import Problem, predict_readings
 from rsea_core.machine.command_motion import FINER, between_rows
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.diagnosed_effects import BETWEEN_KEY, HEAT_KEYS, REST_KEY
-from rsea_core.model.model_file import AMBIENT_C, ModelFile, read_model_file, term_to_toml
+from rsea_core.model.model_file import AMBIENT_C, ModelFile, read_model_file
 from rsea_core.recordings.case import InputRecording
+from rsea_core.terms.tables import term_to_toml
 
 CONTACT = {
     "contact_stiffness_Nm_per_rad": ("contact_stiffness", False),

@@ -6,13 +6,13 @@ import numpy as np
 
 from rsea_core.effects.load_unbalance import LoadUnbalance
 from rsea_core.identify.candidates.rig_parameters import unstated_std
-from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.detectability import minimum_detectable_sizes
 from rsea_core.identify.judgement.insufficient_data import undetectable_sentence
 from rsea_core.identify.judgement.unmodelled_gravity import (
     GRAVITY,
 )
 from rsea_core.identify.result.conclusion import Conclusion
+from rsea_core.identify.result.known_values import corrected_entries
 from rsea_core.identify.result.summary import summary_of
 from rsea_core.identify.selection.common_scale_factor import (
     scale_sentence,
@@ -92,13 +92,13 @@ def corrected_parameters(conclusion: Conclusion) -> dict:
             "std": float(np.hypot(std[j] * per, unstated_std(conclusion.case.rig, p.key))),
             "identifiable": bool(std[j] < 0.7),
         }
-    return found
+    return found | corrected_entries(conclusion)
 
 
 def fit_table(conclusion: Conclusion) -> list[dict]:
     """Open-loop errors of every recording and channel before, with parameters, after."""
     rows = []
-    plain, fit, known = Hypothesis(), conclusion.fit, conclusion.search.parameters
+    plain, fit, known = conclusion.problem.nominal, conclusion.fit, conclusion.search.parameters
     zero = conclusion.problem.start(plain)
     for prepared in conclusion.problem.prepared:
         before = conclusion.predicted(prepared, plain, zero)

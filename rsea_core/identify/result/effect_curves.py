@@ -16,7 +16,7 @@ from rsea_core.effects.spring_hysteresis import SpringHysteresis
 from rsea_core.effects.spring_viscoelastic import SpringViscoelastic
 from rsea_core.effects.variant import Law, TrialMachine, Values
 from rsea_core.engines.fixed_step.replay import CHANNELS
-from rsea_core.identify.fitting.problem import Hypothesis, PreparedRecording, machine_of
+from rsea_core.identify.fitting.problem import PreparedRecording, machine_of
 from rsea_core.identify.result.conclusion import Conclusion
 
 POINTS = 161
@@ -79,7 +79,7 @@ def _loop(conclusion: Conclusion, law: Law) -> dict | None:
 
     None where the torque or an angle was not read.
     """
-    prepared, plain = _prepared_of(conclusion, law), Hypothesis()
+    prepared, plain = _prepared_of(conclusion, law), conclusion.problem.nominal
     needed = ("torque_Nm", "motor_angle_rad", "load_angle_rad")
     if not set(needed) <= set(prepared.channels):
         return None
@@ -118,7 +118,7 @@ def _curve(conclusion: Conclusion, j: int, law: Law, ranges: Ranges) -> dict | N
         values = problem.values(fit.hypothesis, x)[1][j]
         return drawn.evaluate(problem.trial_machine(prepared, fit.hypothesis, x), values, grid)
 
-    plain = Hypothesis()
+    plain = problem.nominal
     found = at(fit.x)
     nominal = drawn.evaluate(problem.trial_machine(prepared, plain, problem.start(plain)), {}, grid)
     offsets = STEP * np.eye(fit.x.size)

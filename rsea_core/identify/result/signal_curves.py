@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from rsea_core.identify.fitting.least_squares import Fit
-from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.judgement.alternatives import considered, distance_errors, nearest
 from rsea_core.identify.result.conclusion import Conclusion
 
@@ -26,7 +25,7 @@ def curves(
     most : int
         Signals, at most.
     """
-    problem, plain = conclusion.problem, Hypothesis()
+    problem, plain = conclusion.problem, conclusion.problem.nominal
     rows = {(r["file"], r["signal"]): r for r in table}
     recordings = sorted(problem.prepared, key=lambda b: b.recording.role != "validation")
     found: list[dict] = []

@@ -8,6 +8,7 @@ from rsea_core.identify.fitting.least_squares import Fit
 from rsea_core.identify.fitting.problem import Problem
 from rsea_core.identify.judgement.insufficient_data import OpenQuestion
 from rsea_core.identify.judgement.residual import UnexplainedResidual
+from rsea_core.identify.result.known_values import known_values
 from rsea_core.identify.selection.common_scale_factor import constants_phrase
 from rsea_core.identify.selection.criteria import TEMPERATURE
 
@@ -59,6 +60,11 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
             f"{p.key} {p.value:.4g} -> {conclusion.nominal[p.key]:.4g}"
             for j, p in enumerate(conclusion.problem.nominals)
             if abs(conclusion.fit.x[j]) > 0.5
+        ]
+        moved += [
+            f"{v.key} {v.stated:.4g} -> {v.found:.4g}"
+            for v in known_values(conclusion)
+            if abs(v.moved) > 0.5
         ]
         torque = conclusion.unknown_torque
         what = (
