@@ -56,24 +56,7 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
         left = "" if torque is None else f" and {torque}"
         return f"The rig file explains the recordings down to the sensors' noise{left}."
     if verdict == "parameters-only":
-        moved = [
-            f"{p.key} {p.value:.4g} -> {conclusion.nominal[p.key]:.4g}"
-            for j, p in enumerate(conclusion.problem.nominals)
-            if abs(conclusion.fit.x[j]) > 0.5
-        ]
-        moved += [
-            f"{v.key} {v.stated:.4g} -> {v.found:.4g}"
-            for v in known_values(conclusion)
-            if abs(v.moved) > 0.5
-        ]
-        torque = conclusion.unknown_torque
-        what = (
-            "explains the recordings; no missing physics." if torque is None
-            else f"and {torque} explain the recordings; no missing physics was found."
-        )  # fmt: skip
-        return f"The nominal model with other values {what}" + (
-            f" Moved most: {', '.join(moved[:4])}." if moved else ""
-        )
+        return _of_moved_values(conclusion)
     without = _without_law(conclusion)
     if without is not None:
         return without
@@ -109,6 +92,27 @@ def summary_of(conclusion: ReportedDiagnosis) -> str:
         if likely:
             less = f" Less sure: {_listed([_named(conclusion, j) for j in likely])}."
     return f"{missing}: {what}; {named} {share} of what re-estimated parameters leave.{less}"
+
+
+def _of_moved_values(conclusion: ReportedDiagnosis) -> str:
+    """That values of the rig file suffice, and which moved."""
+    moved = [
+        f"{p.key} {p.value:.4g} -> {conclusion.nominal[p.key]:.4g}"
+        for j, p in enumerate(conclusion.problem.nominals)
+        if abs(conclusion.fit.x[j]) > 0.5
+    ]
+    moved += [
+        f"{v.key} {v.stated:.4g} -> {v.found:.4g}"
+        for v in known_values(conclusion)
+        if abs(v.moved) > 0.5
+    ]
+    torque = conclusion.unknown_torque
+    what = (
+        "explains the recordings; no missing physics." if torque is None
+        else f"and {torque} explain the recordings; no missing physics was found."
+    )  # fmt: skip
+    more = f" Moved most: {', '.join(moved[:4])}." if moved else ""
+    return f"The nominal model with other values {what}{more}"
 
 
 def _without_law(conclusion: ReportedDiagnosis) -> str | None:
