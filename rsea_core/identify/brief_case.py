@@ -1,8 +1,10 @@
-"""What a quick look fits of a case: few rows, of motion and not of standstill.
+"""What a search fits of a case: so many rows, of motion and not of standstill.
 
 A search simulates every row some thousand times. A recording with more rows than its share is cut;
-what is kept begins where its motion does. Where a cycle of a slow motion has more rows than that,
-only every so manieth row is kept, as far as the fastest cycle of machine and motion allows.
+what is kept begins where its motion does. Rows that a search leaves out are held out: laws must
+predict them (`with_excerpts`). A quick look has few rows. Where a cycle of a slow motion has more
+rows than that, only every so manieth row is kept, as far as the fastest cycle of machine and motion
+allows.
 """
 
 from collections.abc import Sequence
@@ -13,13 +15,17 @@ import numpy as np
 from rsea_core.identify.candidates.motion_cycles import cycle_s, motion_rate
 from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.problem import machine_of
-from rsea_core.identify.fitting.truncation import rows_between, truncate
+from rsea_core.identify.fitting.truncation import common_limit, rows_between, truncate
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.recordings.case import Case, noise_floor
 from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.recording import Recording
 
 BRIEF_ROWS, BRIEF_ROWS_OF_EACH = 2500, 250  # fitted: of all recordings, or more of many
+SEARCH_ROWS, SEARCH_ROWS_OF_EACH = 12_000, 1000  # the same of a search that is no quick look
+SEARCH_CYCLES = 1.0  # of its own motion, that a recording shows in its rows searched
+MOST_SEARCH_ROWS = 16_000
+LONG = 1.25  # times these rows, that a recording has which is cut
 MOST_ROWS = 2  # times as many, where motions are slow
 ROWS_OF_CYCLE = 10  # of the fastest cycle, at least
 CYCLES = 1.0  # of its own motion, that a recording should show
@@ -50,15 +56,53 @@ def brief_case(case: Case) -> tuple[Case, tuple[Finding, ...]]:
     return cut, (*findings, *more)
 
 
+def with_excerpts(case: Case) -> tuple[Case, tuple[Finding, ...]]:
+    """The case with long recordings fitted by their first rows of motion, the rest held out.
+
+    Returns
+    -------
+    Case
+        The same one where it is short enough.
+    tuple of Finding
+        What was held out.
+    """
+    chosen = [r for r in case.identification if not r.quasi_static]
+    least = max(SEARCH_ROWS // max(len(chosen), 1), SEARCH_ROWS_OF_EACH)
+    wanted = [max(least, int(_span_s(r, SEARCH_CYCLES) / r.sample_time_s)) for r in chosen]
+    wanted = [min(rows, r.rows) for rows, r in zip(wanted, chosen, strict=True)]
+    longest = common_limit(wanted, max(MOST_SEARCH_ROWS, least * len(chosen)))
+    limits = {id(r): int(min(rows, longest)) for rows, r in zip(wanted, chosen, strict=True)}
+    if sum(r.rows for r in chosen) < LONG * sum(limits.values()):
+        return case, ()
+    recordings, findings = [], []
+    for r in case.recordings:
+        limit = limits.get(id(r), r.rows)
+        if r.rows < LONG * limit:
+            recordings.append(r)
+            continue
+        moving = _from_first_motion(case, r, limit * len(case.identification))
+        rest = rows_between(moving, limit, moving.rows)
+        recordings += [
+            rows_between(moving, 0, limit),
+            replace(rest, role="validation", initial_rest=False),
+        ]
+        text = (
+            f"{limit * r.sample_time_s:.3g} s of its {r.rows * r.sample_time_s:.3g} s were fitted,"
+            " the rest was held out"
+        )
+        findings.append(Finding(kind=Kind.TRUNCATED, text=text, file=r.file))
+    return replace(case, recordings=tuple(recordings)), tuple(findings)
+
+
 def _rows_of_motion(case: Case) -> int:
     """Rows in which every recording shows a cycle of its own motion."""
     longest = max(_span_s(r) / r.sample_time_s for r in case.identification)
     return int(longest * len(case.identification))
 
 
-def _span_s(r: Recording) -> float:
-    """Seconds in which a recording shows a cycle of its motion; all of it at most."""
-    return min(CYCLES * 2.0 * np.pi / max(motion_rate(r), 1e-9), r.rows * r.sample_time_s)
+def _span_s(r: Recording, cycles: float = CYCLES) -> float:
+    """Seconds in which a recording shows so many cycles of its motion; all of it at most."""
+    return min(cycles * 2.0 * np.pi / max(motion_rate(r), 1e-9), r.rows * r.sample_time_s)
 
 
 def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:

@@ -7,7 +7,7 @@ import numpy as np
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.files.csv_columns import unit_of
-from rsea_core.identify.brief_case import brief_case
+from rsea_core.identify.brief_case import brief_case, with_excerpts
 from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.found import Found
@@ -32,6 +32,7 @@ QUICK_LOOK = Finding(
     kind=Kind.METHOD,
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
+EXPLAINS = ("missing-physics", "parameters-only", "no-mismatch")
 MOST_WORK = 6e8  # simulated rows of a search, after which it begins nothing further
 QUICK_WORK = 2e7  # of a quick look, after which a search ends once it has fitted one candidate
 CURTAILED = Finding(
@@ -63,14 +64,18 @@ def diagnose_windows(
     """
     case, filled = with_servo_gains(case)
     case, clamps = with_yielding_clamps(case)
-    cut: tuple[Finding, ...] = ()
-    if quick:
-        case, cut = brief_case(case)
+    searched, cut = (case, ()) if thorough else brief_case(case) if quick else with_excerpts(case)
     most_work = np.inf if thorough else QUICK_WORK if quick else MOST_WORK
     with limited_work(most_work, strict=quick) as work:
-        found = investigate(case, quick=quick, say=say)
+        found = investigate(searched, quick=quick, say=say)
+    conclusion = WindowVerdict(found, searched if quick else case, say)
+    if cut and not quick and conclusion.verdict not in EXPLAINS:
+        say("the rows held out are not explained: searched again with all rows")
+        cut = ()
+        with limited_work(most_work) as work:
+            found = investigate(case, say=say)
+        conclusion = WindowVerdict(found, case, say)
     say(f"work: {work.done:.3g} simulated rows")
-    conclusion = WindowVerdict(found, case, say)
     brief = QUICK_LOOK if quick else CURTAILED if work.curtailed else None
     findings = [*cut, *([brief] if brief else [])] + [
         Finding(kind=Kind.METHOD, text=clamp.sentence()) for clamp in clamps

@@ -41,7 +41,7 @@ def truncate(
     """
     chosen = [r for r in case.identification if not r.quasi_static]
     row_steps = {r.file: max(1.0, r.sample_time_s / step_s) for r in chosen}
-    limit = _level([r.rows * row_steps[r.file] for r in chosen], most)
+    limit = common_limit([r.rows * row_steps[r.file] for r in chosen], most)
     kept, findings = [], []
     for r in case.recordings:
         steps = row_steps.get(r.file, 0.0)
@@ -58,7 +58,7 @@ def truncate(
     return replace(case, recordings=tuple(kept)), tuple(findings)
 
 
-def _level(sizes: Sequence[float], most: float) -> float:
+def common_limit(sizes: Sequence[float], most: float) -> float:
     """The largest size to which sizes can be cut so that their sum is no more than that."""
     left = float(most)
     for count, size in zip(range(len(sizes), 0, -1), sorted(sizes), strict=True):
