@@ -54,6 +54,10 @@ LIKE_AN_OFFSET = frozenset((LoadUnbalance.effect, SensorOffset.effect))
 SHORT_LOG = 20_000  # rows fitted: of more, windows would take many minutes
 PREDICTED = 0.02  # of the spread of recordings held out: no other search is needed below
 NEAREST_NAME = 0.1  # confidence of a name that is only the nearest to what was seen
+TERMS_UNUSED = Finding(
+    kind=Kind.METHOD,
+    text="the [[term]] tables of the rig file are not used: this method finds such laws by itself",
+)
 WINDOWS_FAILED = Finding(
     kind=Kind.METHOD,
     text="the search in windows failed numerically; laws were judged by free runs of whole"
@@ -105,10 +109,10 @@ def diagnose(
         case = read_case(case, say)
     if design is not None:
         require_spring_bench(case, "diagnose: design")
-    if is_spring_bench(case):
-        found = diagnose_spring_bench(case, design)
-    elif is_steady_map(case):
-        found = diagnose_steady_map(case)
+    if is_spring_bench(case) or is_steady_map(case):
+        spring = is_spring_bench(case)
+        found = diagnose_spring_bench(case, design) if spring else diagnose_steady_map(case)
+        found = found.having(TERMS_UNUSED) if case.known else found
     else:
         found = diagnose_machine(case, quick=quick, thorough=thorough, say=say)
         wanted = not quick if next_experiment is None else next_experiment
@@ -196,12 +200,13 @@ def diagnose_machine(
         say(f"windows: {numeric}; free runs instead")
         try:
             found = diagnose_free_runs(case, quick=quick, thorough=thorough, say=say)
-            return found.having(WINDOWS_FAILED)
+            found = found.having(WINDOWS_FAILED)
+            return found.having(TERMS_UNUSED) if case.known else found
         except np.linalg.LinAlgError as again:
             text = f"{case.name}: no machine of rig.toml can be fitted to these recordings: {again}"
             raise RecordingError(text) from again
-    if quick or not case.validation or not _is_doubtful(found):
-        return found
+    if quick or case.known or not case.validation or not _is_doubtful(found):
+        return found  # free runs do not have the laws that a rig file states
     say("innovations stay dependent, or nothing is named: a second opinion by free runs")
     return _better(found, lambda: diagnose_free_runs(case, thorough=thorough, say=say), say)
 

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rsea_core.effects.registry import Term
 from rsea_core.errors import RigError
 from rsea_core.model.actuator_model import ActuatorModel
 
@@ -56,28 +55,35 @@ def read_posterior(path: str | Path, model: ActuatorModel) -> Posterior:
         std, value = found.get("std"), found.get("to")
         if not std or value is None:
             continue
-        if not hasattr(model.rig, key) or getattr(model.rig, key) is None:
+        own = _own_value(model, key)
+        if own is None:
             held.append(key)
             continue
-        _require_same(path, key, value, getattr(model.rig, key))
+        _require_same(path, key, value, own)
         deviations[key] = float(std)
     for effect in document["effects"]:
-        own = [term for term in model.terms if term.effect == effect["name"]]
         for name, found in effect["parameters"].items():
             key = f"{effect['name']}.{name}"
             std, value = found.get("std"), found.get("value")
             if not std or not isinstance(value, float | int):
                 continue
-            if len(own) != 1 or not isinstance(getattr(own[0], name, None), float):
+            own = _own_value(model, key)
+            if own is None:
                 held.append(key)
                 continue
-            _require_same(path, key, value, _value(own[0], name))
+            _require_same(path, key, value, own)
             deviations[key] = float(std)
     return Posterior(deviations=deviations, held=tuple(held))
 
 
-def _value(term: Term, name: str) -> float:
-    return float(getattr(term, name))
+def _own_value(model: ActuatorModel, key: str) -> float | None:
+    """A field of the rig, or "effect.parameter" of its one term; None where it has none."""
+    effect, _, name = key.partition(".")
+    if not name:
+        return getattr(model.rig, key, None)
+    own = [term for term in model.terms if term.effect == effect]
+    value = getattr(own[0], name, None) if len(own) == 1 else None
+    return value if isinstance(value, float) else None
 
 
 def _document(path: Path) -> Mapping:

@@ -10,17 +10,22 @@ from dataclasses import dataclass, fields, replace
 
 from rsea_core.effects.base import Port, Term
 from rsea_core.effects.drive_delay import DriveDelay
+from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.drive_thermal import DriveThermal
+from rsea_core.effects.formula_torque import FormulaTorque
+from rsea_core.effects.gear_backlash import GearBacklash
 from rsea_core.effects.load_disturbance import LoadDisturbance
 from rsea_core.effects.registry import LAWS
 from rsea_core.effects.typical import TypicalMagnitudes
 from rsea_core.effects.variant import Law, Unknown, candidates_of, writes_numbers
-from rsea_core.errors import TermError
+from rsea_core.errors import RseaError, TermError
 from rsea_core.machine.rig import Rig
 from rsea_core.terms.tables import TOLERANCE, term_from_table
 
 USUAL_TOLERANCE = 0.5  # of a stated value, relative: data sheets give typical values or limits
-OF_RECORDINGS = (DriveThermal.effect, LoadDisturbance.effect)  # depend on what was before, or when
+OF_RECORDINGS = (DriveThermal, LoadDisturbance)  # depend on what was before, or when
+OTHERWISE = (DriveOffset, FormulaTorque, GearBacklash)  # estimated anyway; by number; of two bodies
+COUNT = "cycles"  # in the name of a count, which a fit does not move
 RANGE = 1e3  # a fit may leave a stated value by this factor
 STEP = 0.2  # tolerances that a step of a fit is worth
 HELD_LOADS_SPARE = (Port.LOAD, Port.ENVIRONMENT)
@@ -34,7 +39,7 @@ class KnownTerm:
     ----------
     term : Term
     stated : tuple of str
-        The parameters above zero that the file states: a fit moves these.
+        The parameters that the file states: a fit moves those above zero that are no counts.
     tolerance : float
         Relative standard deviation of their values.
     """
@@ -57,7 +62,7 @@ class KnownTerm:
                 unknowns.append(unknown)
                 starts.append(start)
                 continue
-            free, low, high = name in self.stated, *p.bounds
+            free, low, high = self._is_free(name), *p.bounds
             if free:
                 low, high = max(low, p.value / RANGE), min(high, p.value * RANGE)
             unknowns.append(
@@ -71,6 +76,9 @@ class KnownTerm:
             unknowns=tuple(unknowns), starts=(tuple(starts),), nuisance=True, known=True,
             write=writes_numbers(kind, moving_load=kind.port in HELD_LOADS_SPARE),
         )  # fmt: skip
+
+    def _is_free(self, name: str) -> bool:
+        return name in self.stated and COUNT not in name and getattr(self.term, name) > 0.0
 
     def _form(self, typical: TypicalMagnitudes) -> dict[str, tuple[Unknown, float]]:
         """Free values of the law's form that the file does not state, and where they start."""
@@ -123,13 +131,12 @@ def known_terms(tables: Mapping, rig: Rig, where: str) -> tuple[KnownTerm, ...]:
         try:
             term = term_from_table(entries, position)
             _require_known_kind(term, rig, f"term {position} ({term.effect})")
-        except TermError as problem:
+        except RseaError as problem:
             raise TermError(f"{where}: {problem}") from problem
         if any(other.term.effect == term.effect for other in found):
             raise TermError(f"{place}: {term.effect} is there twice: keep one")
         bounds = term.parameters()
-        stated = tuple(k for k in entries if k in bounds and bounds[k].value > 0.0)
-        known = KnownTerm(term=term, stated=stated)
+        known = KnownTerm(term=term, stated=tuple(k for k in entries if k in bounds))
         if TOLERANCE in entries:
             known = replace(known, tolerance=float(entries[TOLERANCE]))
         found.append(known)
@@ -140,7 +147,7 @@ def is_stateable(kind: type[Term]) -> bool:
     """Whether a rig file can state a term: it acts in the machine by its own numbers alone."""
     own = all(getattr(kind, name) is getattr(Term, name) for name in ("on_spring", "on_plant"))
     of_numbers = all("bounds" in f.metadata for f in fields(kind))
-    known = kind.port is not Port.SENSOR and kind.effect not in OF_RECORDINGS
+    known = kind.port is not Port.SENSOR and not issubclass(kind, (*OF_RECORDINGS, *OTHERWISE))
     return own and of_numbers and known and kind.replaces is None
 
 
@@ -148,8 +155,10 @@ def _require_known_kind(term: Term, rig: Rig, place: str) -> None:
     if not is_stateable(type(term)):
         names = [e for e, laws in LAWS.items() if any(map(is_stateable, laws.values()))]
         raise TermError(f"{place}: a rig file can state {', '.join(names)}")
-    if term.effect != DriveDelay.effect and term.rig_numbers(rig, 0.0):
-        raise TermError(f"{place}: a rig file can state no friction by the bearing's load")
+    if term.effect == DriveDelay.effect and rig.servo_delay_s is not None:
+        raise TermError(f"{place}: servo_delay_s in [rig] states it too: keep one")
+    if term.rig_numbers(rig, 0.0):
+        raise TermError(f"{place}: normal_lever_m: a rig file states friction as coulomb_Nm alone")
     part = {Port.ENVIRONMENT: "load"}.get(term.port, term.port.value[0])
     shaft = part == "load" and not rig.has("spring")
     if not shaft and not rig.has(part):

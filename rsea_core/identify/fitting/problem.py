@@ -261,6 +261,7 @@ class Problem:
         if not law.known:
             return True
         found, body = set(hypothesis.effects), of_one_body(self.case.rig)
+        found |= {w.kind.generalises for w in hypothesis.laws if w.kind and not w.nuisance}
         return law.effect not in (found | body if found & body else found)
 
     def innovations(

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from rsea_core.effects.variant import Law
 from rsea_core.identify.fitting.problem import Hypothesis
+from rsea_core.identify.law_search.stated_starts import beside_stated
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.kalman_filter import huber_weights
 from rsea_core.identify.multistep.tracks import Track
@@ -149,17 +150,19 @@ def screen(
     """
     laws = [law for law in laws if not law.follows]
     projection = projection or Projection(estimator, fit)
+    problem = estimator.problem
+    starts = {w.key: [beside_stated(problem, fit, w, s) for s in w.starts] for w in laws}
     jobs = [
         (law, start)
         for law in laws
-        for begin in law.starts
+        for begin in starts[law.key]
         for start in (begin, quarter_turn(law, begin))
         if start is not None
     ]
     columns = _columns(projection, jobs)
     best: dict[str, Candidate] = {}
     for law in laws:
-        for start in law.starts:
+        for start in starts[law.key]:
             turned = quarter_turn(law, start)
             pair = [columns[law.key, s] for s in (start, turned) if s is not None]
             judged = projection.judged(np.array(pair))

@@ -75,7 +75,7 @@ def _of_experiment(case: Case) -> tuple[Law, ...]:
 
 def _stated_delay(case: Case, servo: bool) -> tuple[float | None, float]:
     """The delay of commands that the rig file states, and its relative tolerance."""
-    if servo:
+    if servo and case.rig.servo_delay_s is not None:
         share = dict(case.rig.tolerances).get("servo_delay_s", TOLERANCES["servo_delay_s"])
         return case.rig.servo_delay_s, share
     known = (k for k in case.known if k.term.effect == DriveDelay.effect)

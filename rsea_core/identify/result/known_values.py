@@ -30,7 +30,7 @@ def known_values(conclusion: Conclusion) -> list[KnownValue]:
         for unknown, start in zip(law.unknowns, law.starts[0], strict=True):
             if unknown.scale == 0.0:
                 continue
-            is_stated = law.known and unknown.name in stated[law.effect]
+            is_stated = law.nuisance and unknown.name in stated.get(law.effect, ())
             if is_stated and problem.acts(law, fit.hypothesis):
                 value, std = values[unknown.name], conclusion.spread.std[at] * unknown.scale
                 found.append(

@@ -240,6 +240,11 @@ def _parameters(corrected: Mapping) -> list[dict]:
 def _unit(name: str) -> str:
     if name in QUANTITIES:
         return QUANTITIES[name]["unit"]
+    effect, _, parameter = name.partition(".")
+    if parameter:  # of a law that the rig file states
+        kinds = LAWS[effect].values()
+        known = (k.__dataclass_fields__.get(parameter) for k in kinds)
+        return next(f.metadata["unit"] for f in known if f is not None)
     return {"stiffness": "Nm/rad", "damping": "Nms/rad"}.get(name.split("_")[1], "rad")
 
 

@@ -92,6 +92,40 @@ def test_a_robot_model_fills_in_what_the_rig_file_lacks(bench):
     assert found.load_mass_kg == RIG.load_mass_kg
 
 
+def test_physics_that_the_rigs_file_states_is_carried_to_the_case(bench):
+    stated = '[[term]]\neffect = "gear-friction"\ncoulomb_Nm = 0.012\ntolerance = 0.25\n'
+    (bench / "rig.toml").write_text(RIG.to_toml() + stated)
+    assert imported(bench) == 0
+    assert stated in (bench / "case" / "rig.toml").read_text()
+    (known,) = read_case(bench / "case").known
+    assert (known.term.coulomb_Nm, known.tolerance) == (0.012, 0.25)
+
+
+def test_a_rig_file_to_fill_in_says_how_dry_friction_is_stated(bench):
+    assert main(["import", str(bench / "log.csv"), "--out", str(bench / "f"), "--yes"]) == 0
+    text = (bench / "f" / "rig.toml").read_text()
+    hint = next(part for part in text.split("\n\n") if "Known dry friction" in part)
+    lines = [line.removeprefix("# ") for line in hint.splitlines()[1:]]
+    assert lines == ["[[term]]", 'effect = "gear-friction"', "coulomb_Nm = ..."]
+
+
+@pytest.mark.parametrize("command", ["import", "doctor", "diagnose"])
+def test_a_term_that_cannot_be_used_is_one_line_and_status_2(command, bench, capsys):
+    imported(bench)
+    capsys.readouterr()
+    bad = '[[term]]\neffect = "gear-friction"\ncoulomb = 0.012\n'
+    if command == "import":
+        (bench / "rig.toml").write_text(RIG.to_toml() + bad)
+        assert imported(bench, "--force") == 2
+    else:
+        path = bench / "case" / "rig.toml"
+        path.write_text(path.read_text().replace("[[recording]]", bad + "[[recording]]"))
+        assert main([command, str(bench / "case"), "--out", str(bench / "found")]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert len(said) == 1
+    assert "rig.toml: term 1 (gear-friction): unknown key 'coulomb'; the nearest" in said[0]
+
+
 def test_a_spring_of_the_library_gives_its_stiffness(bench):
     assert main(["import", str(bench / "log.csv"), "--out", str(bench / "f"), "--yes",
                  "--spring", "al1"]) == 0  # fmt: skip

@@ -1,17 +1,21 @@
 """One call diagnoses a spring, a map of steady speeds or a machine, as the command does."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import rsea_core
-from rsea_core.effects.registry import SpringCurve
+from rsea_core.effects.registry import GearFriction, SpringCurve
+from rsea_core.identify.diagnose import TERMS_UNUSED, is_bench
 from rsea_core.identify.result.corrected_model import FoundModel
 from rsea_core.identify.result.diagnosis import Diagnosis
 from rsea_core.identify.spring_bench.diagnose import SpringConclusion
 from rsea_core.identify.steady_map.diagnose import MapDiagnosis
+from rsea_core.terms.known import KnownTerm
 from tests.cases.one_axis import axis_recording, axis_rig
+from tests.cases.planted import planted
 from tests.cases.recorded import map_case, write_rig
 
 HERE = "rsea_core.identify.diagnose"
@@ -101,6 +105,21 @@ def test_a_folder_with_a_map_of_steady_speeds_is_diagnosed_by_its_path(tmp_path)
     assert term.coulomb_Nm == pytest.approx(3e-4, rel=0.05)
     assert found.report_data()["verdict"] == found.verdict == "missing-physics"
     assert [f.sentence() for f in found.findings] == found.document["findings"]
+
+
+def test_a_map_of_steady_speeds_says_that_it_does_not_use_stated_terms(tmp_path):
+    case = map_case(tmp_path, lambda speed, load: np.sign(speed) * 3e-4 + 5e-6 * speed)
+    known = KnownTerm(term=GearFriction(coulomb_Nm=3e-4), stated=("coulomb_Nm",))
+    found = rsea_core.diagnose(replace(case, known=(known,)))
+    assert found.findings[-1] is TERMS_UNUSED
+    assert "[[term]] tables of the rig file are not used" in found.document["findings"][-1]
+
+
+def test_a_case_with_stated_terms_is_of_no_bench(tmp_path):
+    case = planted(tmp_path).case
+    known = KnownTerm(term=GearFriction(coulomb_Nm=3e-4), stated=("coulomb_Nm",))
+    assert is_bench(case)
+    assert not is_bench(replace(case, known=(known,)))
 
 
 def test_a_spring_is_compared_with_its_design_and_predicted(tmp_path):

@@ -114,7 +114,7 @@ def test_differing_constants_and_unused_values_are_findings(tmp_path):
         (MINIMAL + '[anchor]\nquantity = ["gear_ratio"]\n', "unknown key 'quantity'"),
         (
             MINIMAL + "motor_coulomb_Nm = 0.009\n",
-            "motor_coulomb_Nm: the machine of a rig file",
+            "motor_coulomb_Nm: dry friction that is known is a term: write [[term]]",
         ),
         (MINIMAL + '[anchor]\nquantities = ["mass"]\n', "unknown quantity 'mass'"),
         ("[rig\n", "is not TOML"),

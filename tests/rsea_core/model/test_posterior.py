@@ -98,3 +98,13 @@ def test_what_is_no_diagnosis_of_this_machine_is_refused(tmp_path, more, says):
         read_posterior(diagnosis(tmp_path, **more), MODEL)
     with pytest.raises(RseaError, match="cannot be read"):
         read_posterior(tmp_path / "none.json", MODEL)
+
+
+def test_a_value_that_the_rig_file_stated_of_a_law_is_the_terms_parameter(tmp_path):
+    known = {"from": 0.01, "to": 0.02, "std": 0.004, "identifiable": True}
+    path = diagnosis(tmp_path, parameters_corrected={
+        "gear-friction.coulomb_Nm": known, "load-friction.coulomb_Nm": known,
+    }, effects=[])  # fmt: skip
+    found = read_posterior(path, MODEL)
+    assert found.deviations == {"gear-friction.coulomb_Nm": 0.004}
+    assert found.held == ("load-friction.coulomb_Nm",)

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from rsea_core.effects.gear_friction import GearFriction
 from rsea_core.errors import RecordingError, RseaError
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.bench_log import TICK_s
@@ -290,3 +291,17 @@ def test_the_noise_of_a_motion_that_is_read_at_uneven_times_is_that_of_its_readi
     readings = 60.0 * np.sin(0.2 * time) + 1e-3 * rng.standard_normal(3000)
     assert apparent_noise(readings, time, order) == pytest.approx(1e-3, rel=0.1)
     assert apparent_noise(readings, None, order) > 2e-3
+
+
+def test_a_case_has_the_physics_that_its_rig_file_states(tmp_path):
+    term = '[[term]]\neffect = "gear-friction"\ncoulomb_Nm = 0.012\ntolerance = 0.3\n'
+    (known,) = read_case(case(tmp_path, RIG + term)).known
+    assert known.term == GearFriction(coulomb_Nm=0.012)
+    assert (known.stated, known.tolerance) == (("coulomb_Nm",), 0.3)
+    assert read_case(case(tmp_path)).known == ()
+
+
+def test_a_term_that_cannot_be_used_is_one_line_of_the_rig_file(tmp_path):
+    term = '[[term]]\neffect = "gear-friction"\ncoulomb_nm = 0.012\n'
+    with pytest.raises(RseaError, match=r"rig\.toml: term 1 \(gear-friction\): unknown key"):
+        read_case(case(tmp_path, RIG + term))

@@ -8,6 +8,7 @@ from rsea_core.errors import ScenarioError
 from rsea_core.model.actuator_model import ActuatorModel
 from rsea_core.model.model_file import write_model
 from rsea_core.scenarios.comparison_file import read_comparison
+from rsea_core.scenarios.scenario import run_scenario
 
 TAIL = """
 [load]
@@ -49,3 +50,19 @@ def test_second_spring_next_to_that_of_a_model_file_is_refused(tmp_path, text):
     read = Scenario.from_toml if text is SCENARIO else read_comparison
     with pytest.raises(ScenarioError, match=r"spring-curve of model.toml: give one of them"):
         read(path)
+
+
+def test_the_rig_file_of_a_case_is_a_machine_with_the_physics_that_it_states(tmp_path):
+    rig = Rig.preset("rsea-bench").to_toml()
+    listed = '[[recording]]\nfile = "a.csv"\nload = "locked"\n'
+    stated = '[[term]]\neffect = "gear-friction"\ncoulomb_Nm = 0.0123\ntolerance = 0.2\n'
+    path = tmp_path / "experiment.toml"
+    path.write_text('rig = "rig.toml"\n' + SCENARIO, encoding="utf-8")
+    errors = []
+    for terms in ("", stated):
+        (tmp_path / "rig.toml").write_text(f"{rig}\n{terms}\n{listed}", encoding="utf-8")
+        scenario = Scenario.from_toml(path)
+        assert scenario.rig == Rig.preset("rsea-bench")
+        errors.append(run_scenario(scenario).metrics.rmse_Nm)
+    assert scenario.terms == (GearFriction(coulomb_Nm=0.0123),)
+    assert errors[1] > 1.05 * errors[0]

@@ -4,8 +4,11 @@ from dataclasses import replace
 
 import pytest
 
+from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
+from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.identify.multistep.log_nuisances import RATIO, half_digit, nuisances
+from rsea_core.terms.known import KnownTerm
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
 
@@ -53,3 +56,21 @@ def test_an_offset_may_exceed_commands_that_are_small_for_the_drive(tmp_path):
              for r in (moved, quiet)]  # fmt: skip
     largest = float(abs(moved.columns["current_command_A"]).max())
     assert highs == pytest.approx([largest, 0.2 * axis_rig().current_limit_A])
+
+
+def test_a_delay_that_the_rig_file_states_is_the_delays_centre_and_spread(tmp_path):
+    delay = KnownTerm(term=DriveDelay(delay_s=0.015), stated=("delay_s",), tolerance=0.2)
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    free, stated = nuisances(case), nuisances(replace(case, known=(delay,)))
+    assert [law.effect for law in free] == [law.effect for law in stated]
+    (late,) = (law for law in stated if law.kind is DriveDelay)
+    assert late.starts == ((0.015,),)
+    assert (late.unknowns[0].log, late.unknowns[0].prior) == (True, 0.2)
+
+
+def test_laws_that_the_rig_file_states_come_first(tmp_path):
+    friction = KnownTerm(term=LoadFriction(coulomb_Nm=0.1), stated=("coulomb_Nm",))
+    case = axis_case(tmp_path, axis_recording(seed=1), rig=axis_rig())
+    first, *others = nuisances(replace(case, known=(friction,)))
+    assert (first.effect, first.known) == ("load-friction", True)
+    assert [w.key for w in others] == [w.key for w in nuisances(case)]
