@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.gear_friction import GearFriction
+from rsea_core.effects.load_friction import LoadFriction
 from rsea_core.effects.variant import Law
-from rsea_core.identify.fitting.problem import Hypothesis
-from rsea_core.identify.law_search.stated_starts import beside_stated
+from rsea_core.identify.fitting.problem import Hypothesis, Problem
 from rsea_core.identify.multistep.estimator import Estimate, Estimator, stretches_of
 from rsea_core.identify.multistep.kalman_filter import huber_weights
 from rsea_core.identify.multistep.tracks import Track
@@ -22,6 +23,7 @@ from rsea_core.identify.multistep.tracks import Track
 BATCH = 24  # trials predicted at once
 SMALLEST, LARGEST = 1e-3, 1e3  # size of a start that is screened again
 FAR_BELOW, REDUCED = 0.1, 0.01  # size below which all starts are; their size if none gained
+TORQUE, ANGLE = "coulomb_Nm", "presliding_rad"  # of dry friction on either side of a gear
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -151,7 +153,7 @@ def screen(
     laws = [law for law in laws if not law.follows]
     projection = projection or Projection(estimator, fit)
     problem = estimator.problem
-    starts = {w.key: [beside_stated(problem, fit, w, s) for s in w.starts] for w in laws}
+    starts = {w.key: [_from_stated(problem, fit, w, s) for s in w.starts] for w in laws}
     jobs = [
         (law, start)
         for law in laws
@@ -250,3 +252,36 @@ def _mixed(law: Law, start: Sequence[float], size: NDArray) -> tuple[float, ...]
             other = names.index(name.replace("sin_", "cos_"))
             mixed[j], mixed[other] = size[0] * start[j], size[1] * start[j]
     return tuple(mixed)
+
+
+def _from_stated(
+    problem: Problem, fit: Estimate, law: Law, start: Sequence[float]
+) -> tuple[float, ...]:
+    """A start of a law with the fitted values of the stated law whose place it takes, if any.
+
+    The column must show what a richer law adds to a stated level of friction, and not that level.
+    """
+    laws, shared = fit.hypothesis.laws, {}
+    if not any(w.known for w in laws):
+        return tuple(start)
+    values, together = problem.values(fit.hypothesis, fit.x)[1], Hypothesis(laws=(*laws, law))
+    for stated, v in zip(laws, values, strict=True):
+        if problem.acts(stated, fit.hypothesis) and not problem.acts(stated, together):
+            free = {u.name: v[u.name] for u in stated.unknowns if u.scale > 0.0}
+            shared |= _on_side_of(law, stated, free, problem.case.rig.gear_ratio or 1.0)
+    return tuple(
+        min(max(shared.get(u.name, value), u.low), u.high)
+        for u, value in zip(law.unknowns, start, strict=True)
+    )
+
+
+def _on_side_of(law: Law, stated: Law, values: dict, ratio: float) -> dict:
+    """Values of a stated law on the side of the gear that a law of the same body is stated on."""
+    motor = GearFriction.effect
+    if (law.effect == motor) == (stated.effect == motor):
+        return values
+    if LoadFriction.effect not in (law.effect, stated.effect):
+        return {}
+    up = ratio if law.effect == motor else 1.0 / ratio
+    factors = {TORQUE: 1.0 / up, ANGLE: up}
+    return {name: values[name] * factor for name, factor in factors.items() if name in values}

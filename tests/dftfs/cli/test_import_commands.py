@@ -121,9 +121,9 @@ def test_a_term_that_cannot_be_used_is_one_line_and_status_2(command, bench, cap
         path = bench / "case" / "rig.toml"
         path.write_text(path.read_text().replace("[[recording]]", bad + "[[recording]]"))
         assert main([command, str(bench / "case"), "--out", str(bench / "found")]) == 2
-    said = capsys.readouterr().err.strip().splitlines()
-    assert len(said) == 1
-    assert "rig.toml: term 1 (gear-friction): unknown key 'coulomb'; the nearest" in said[0]
+    printed = capsys.readouterr().err.strip().splitlines()
+    assert len(printed) == 1
+    assert "rig.toml: term 1 (gear-friction): unknown key 'coulomb'; the nearest" in printed[0]
 
 
 def test_a_spring_of_the_library_gives_its_stiffness(bench):

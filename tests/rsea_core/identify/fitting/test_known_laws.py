@@ -45,7 +45,7 @@ def test_a_found_law_of_the_effect_takes_its_place(problem, found):
     assert np.array_equal(numbers_of(problem, together), alone)
 
 
-def test_a_found_law_of_another_effect_acts_beside_it(problem):
+def test_a_found_law_of_another_effect_acts_together_with_it(problem):
     law = catalogue(problem.case)["load-drag/quadratic"]
     together = Hypothesis(laws=(*problem.nominal.laws, law))
     assert problem.acts(problem.nominal.laws[0], together)

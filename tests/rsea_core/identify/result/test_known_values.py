@@ -65,7 +65,7 @@ def test_a_value_beyond_three_tolerances_is_a_question_and_its_unit_is_the_terms
     assert (units[KEY], units["drive-delay.delay_s"]) == ("Nm", "s")
 
 
-def test_a_peak_at_rest_beside_the_stated_level_is_found_and_takes_its_place(tmp_path):
+def test_a_peak_at_rest_above_the_stated_level_is_found_and_takes_its_place(tmp_path):
     peak = LoadFriction(coulomb_Nm=TRUE_Nm, stribeck_rise=1.5, stribeck_velocity_rad_per_s=0.5)
     case = axis_case(tmp_path, axis_recording(peak, seed=1), rig=axis_rig())
     found = diagnose(replace(case, known=(stated(TRUE_Nm),)), next_experiment=False)
