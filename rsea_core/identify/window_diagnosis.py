@@ -1,6 +1,7 @@
 """`diagnosis.json` and the model of a multistep search."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,6 +23,7 @@ from rsea_core.identify.result.diagnosis_json import corrected_parameters, fit_t
 from rsea_core.identify.result.known_values import known_as_terms, known_values
 from rsea_core.identify.servo_gains import servo_findings, with_servo_gains
 from rsea_core.identify.whole_runs.single_zeros import zeros_of
+from rsea_core.identify.whole_runs.stated_form import with_stated_form
 from rsea_core.identify.window_verdict import WindowVerdict, unexplained_place
 from rsea_core.numeric.work_limit import limited_work
 from rsea_core.recordings.case import Case
@@ -67,13 +69,14 @@ def diagnose_windows(
     searched, cut = (case, ()) if thorough else brief_case(case) if quick else with_excerpts(case)
     most_work = np.inf if thorough else QUICK_WORK if quick else MOST_WORK
     with limited_work(most_work, strict=quick) as work:
+        searched = with_stated_form(searched, say, quick=quick)
         found = investigate(searched, quick=quick, say=say)
     conclusion = WindowVerdict(found, searched if quick else case, say)
     if cut and not quick and conclusion.verdict not in EXPLAINS:
         say("the rows held out are not explained: searched again with all rows")
         cut = ()
         with limited_work(most_work) as work:
-            found = investigate(case, say=say)
+            found = investigate(replace(case, known=searched.known), say=say)
         conclusion = WindowVerdict(found, case, say)
     say(f"work: {work.done:.3g} simulated rows")
     brief = QUICK_LOOK if quick else CURTAILED if work.curtailed else None

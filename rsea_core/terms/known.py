@@ -77,6 +77,10 @@ class KnownTerm:
             write=writes_numbers(kind, moving_load=kind.port in HELD_LOADS_SPARE),
         )  # fmt: skip
 
+    def without_form(self, typical: TypicalMagnitudes) -> "KnownTerm":
+        """The same, its form as stated: friction that the file states no presliding of is rigid."""
+        return replace(self, stated=(*self.stated, *self._form(typical)))
+
     def _is_free(self, name: str) -> bool:
         return name in self.stated and COUNT not in name and getattr(self.term, name) > 0.0
 

@@ -51,7 +51,7 @@ def test_friction_stated_three_times_too_small_is_another_value(tmp_path):
     found = diagnosed(tmp_path, stated(TRUE_Nm / 3.0))
     assert (found.verdict, found.effects, questions(found)) == ("parameters-only", [], [])
     assert coulomb_of(found) == pytest.approx(TRUE_Nm, rel=0.04)
-    assert f"Moved most: {KEY} 0.05 -> 0.15" in found.summary
+    assert f"Moved most: {KEY} 0.05 -> 0.1" in found.summary
 
 
 def test_a_value_beyond_three_tolerances_is_a_question_and_its_unit_is_the_terms(tmp_path):
@@ -77,3 +77,18 @@ def test_a_peak_at_rest_above_the_stated_level_is_found_and_takes_its_place(tmp_
     values = next(w["values"] for w in model["law"] if w["effect"] == "load-friction")
     assert values["coulomb_Nm"] == pytest.approx(TRUE_Nm, rel=0.03)
     assert values["stribeck_rise"] == pytest.approx(1.5, rel=0.05)
+
+
+@pytest.mark.parametrize("stretch_rad", [0.0, 0.02])
+def test_friction_that_is_stated_by_its_level_holds_in_the_form_that_recordings_show(
+    tmp_path, stretch_rad
+):
+    dry = LoadFriction(coulomb_Nm=TRUE_Nm, presliding_rad=stretch_rad)
+    case = axis_case(tmp_path, axis_recording(dry, seed=1), rig=axis_rig())
+    found = diagnose(replace(case, known=(stated(0.1),)), next_experiment=False)
+    named = {effect["name"] for effect in found.effects}
+    assert not named & {"load-friction", "gear-friction"}
+    assert stretch_rad or found.verdict == "parameters-only"  # coarse steps made the elastic one
+    (term,) = tomllib.loads(found.model.to_toml())["term"]
+    assert term["coulomb_Nm"] == pytest.approx(TRUE_Nm, rel=0.03)
+    assert term["presliding_rad"] == pytest.approx(stretch_rad, rel=0.05)
