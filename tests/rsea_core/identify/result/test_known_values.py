@@ -79,16 +79,16 @@ def test_a_peak_at_rest_above_the_stated_level_is_found_and_takes_its_place(tmp_
     assert values["stribeck_rise"] == pytest.approx(1.5, rel=0.05)
 
 
-@pytest.mark.parametrize("stretch_rad", [0.0, 0.02])
+@pytest.mark.parametrize("presliding_rad", [0.0, 0.02])
 def test_friction_that_is_stated_by_its_level_holds_in_the_form_that_recordings_show(
-    tmp_path, stretch_rad
+    tmp_path, presliding_rad
 ):
-    dry = LoadFriction(coulomb_Nm=TRUE_Nm, presliding_rad=stretch_rad)
+    dry = LoadFriction(coulomb_Nm=TRUE_Nm, presliding_rad=presliding_rad)
     case = axis_case(tmp_path, axis_recording(dry, seed=1), rig=axis_rig())
     found = diagnose(replace(case, known=(stated(0.1),)), next_experiment=False)
     named = {effect["name"] for effect in found.effects}
     assert not named & {"load-friction", "gear-friction"}
-    assert stretch_rad or found.verdict == "parameters-only"  # coarse steps made the elastic one
+    assert presliding_rad or found.verdict == "parameters-only"  # coarse steps made the elastic one
     (term,) = tomllib.loads(found.model.to_toml())["term"]
     assert term["coulomb_Nm"] == pytest.approx(TRUE_Nm, rel=0.03)
-    assert term["presliding_rad"] == pytest.approx(stretch_rad, rel=0.05)
+    assert term["presliding_rad"] == pytest.approx(presliding_rad, rel=0.05)
