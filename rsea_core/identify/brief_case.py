@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from rsea_core.identify.candidates.motion_cycles import cycle_s, motion_rate
+from rsea_core.identify.candidates.motion_cycles import cycle_s, rate_without_noise
 from rsea_core.identify.fitting.decimation import decimate
 from rsea_core.identify.fitting.problem import machine_of
-from rsea_core.identify.fitting.truncation import common_limit, rows_between, truncate
+from rsea_core.identify.fitting.truncation import common_limit, rows_between
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.recordings.case import Case, noise_floor
 from rsea_core.recordings.finding import Finding, Kind
@@ -49,11 +49,45 @@ def brief_case(case: Case) -> tuple[Case, tuple[Finding, ...]]:
         return case, ()
     coarse, findings = _in_coarse_rows(case, most)
     most = min(max(most, _rows_of_motion(coarse)), MOST_ROWS * most)
-    moving = replace(
-        coarse, recordings=tuple(_from_first_motion(coarse, r, most) for r in coarse.recordings)
-    )
-    cut, more = truncate(moving, np.inf, most, reason=REASON)
-    return cut, (*findings, *more)
+    limits = _shared_out(coarse, most)
+    recordings = []
+    for r in coarse.recordings:
+        limit = limits.get(id(r), r.rows)
+        if limit >= r.rows:
+            recordings.append(r)
+            continue
+        kept = f"{limit * r.sample_time_s:.4g} s of its {r.rows * r.sample_time_s:.4g} s were"
+        text = f"only {kept} fitted: {REASON}" if limit else f"not fitted: {REASON}"
+        findings += (Finding(kind=Kind.TRUNCATED, file=r.file, text=text),)
+        if limit:
+            recordings.append(rows_between(_from_first_motion(coarse, r, limit), 0, limit))
+    return replace(coarse, recordings=tuple(recordings)), findings
+
+
+def _shared_out(case: Case, most: int) -> dict[int, int]:
+    """Rows that are fitted of each identification recording, by its id; 0: it is left out.
+
+    Recordings whose motion shows a cycle in the fewest rows come first, one of each kind of load
+    before all others: a whole cycle of some says more than the beginning of all.
+    """
+    chosen = [r for r in case.identification if not r.quasi_static]
+    least = min(BRIEF_ROWS_OF_EACH, most // max(len(chosen), 1))
+    wanted = {id(r): min(r.rows, max(least, int(_span_s(r) / r.sample_time_s))) for r in chosen}
+    order = sorted(chosen, key=lambda r: wanted[id(r)])
+    firsts = [next(r for r in order if r.load.kind == k) for k in {r.load.kind: 0 for r in order}]
+    limits, left = dict.fromkeys(wanted, 0), most
+    for r in (*firsts, *(r for r in order if not any(r is f for f in firsts))):
+        forced = any(r is f for f in firsts)
+        if wanted[id(r)] <= left or forced:
+            limits[id(r)] = max(min(wanted[id(r)], left), least)
+            left -= limits[id(r)]
+    kept = [r for r in chosen if limits[id(r)]]
+    level = common_limit([r.rows for r in kept], most)
+    for r in sorted(kept, key=lambda r: limits[id(r)]):
+        more = min(max(int(min(level, r.rows)) - limits[id(r)], 0), max(left, 0))
+        limits[id(r)] += more
+        left -= more
+    return limits
 
 
 def with_excerpts(case: Case) -> tuple[Case, tuple[Finding, ...]]:
@@ -80,7 +114,7 @@ def with_excerpts(case: Case) -> tuple[Case, tuple[Finding, ...]]:
         if r.rows < LONG * limit:
             recordings.append(r)
             continue
-        moving = _from_first_motion(case, r, limit * len(case.identification))
+        moving = _from_first_motion(case, r, limit)
         rest = rows_between(moving, limit, moving.rows)
         recordings += [
             rows_between(moving, 0, limit),
@@ -102,13 +136,16 @@ def _rows_of_motion(case: Case) -> int:
 
 def _span_s(r: Recording, cycles: float = CYCLES) -> float:
     """Seconds in which a recording shows so many cycles of its motion; all of it at most."""
-    return min(cycles * 2.0 * np.pi / max(motion_rate(r), 1e-9), r.rows * r.sample_time_s)
+    return min(cycles * 2.0 * np.pi / max(rate_without_noise(r), 1e-9), r.rows * r.sample_time_s)
 
 
 def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:
     """Rows as long as the fastest cycle of all recordings allows, and no longer than needed."""
     problem = MultistepProblem(case)
-    cycles = [cycle_s(machine_of(e.base), e.stiffness, e.recording) for e in problem.prepared]
+    cycles = [
+        cycle_s(machine_of(e.base), e.stiffness, e.recording, rate=rate_without_noise(e.recording))
+        for e in problem.prepared
+    ]
     longest_s = min(cycles) / ROWS_OF_CYCLE
     share = most / len(case.identification)
     needed_s = max(_span_s(r) for r in case.identification) / share
@@ -130,9 +167,9 @@ def _in_coarse_rows(case: Case, most: int) -> tuple[Case, tuple[Finding, ...]]:
     return coarse, findings
 
 
-def _from_first_motion(case: Case, r: Recording, most: int) -> Recording:
-    """A recording without the standstill at its beginning, as far as it has rows to spare."""
-    spare = r.rows - most // max(len(case.identification), 1)
+def _from_first_motion(case: Case, r: Recording, limit: int) -> Recording:
+    """A recording without the standstill at its beginning, as far as more than `limit` are left."""
+    spare = r.rows - limit
     if r.role != "identification" or r.quasi_static or not r.initial_rest or spare <= 0:
         return r
     floors = noise_floor(case.rig, r)

@@ -5,7 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rsea_core.identify.brief_case import BRIEF_ROWS, MOST_ROWS, brief_case
+from rsea_core.identify.brief_case import (
+    BRIEF_ROWS,
+    MOST_ROWS,
+    MOST_SEARCH_ROWS,
+    SEARCH_ROWS,
+    brief_case,
+    with_excerpts,
+)
 from rsea_core.identify.fitting.truncation import rows_between
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -55,3 +62,40 @@ def test_rows_of_a_recording_are_those_of_its_log_too(case):
     assert part.time_s[0] == 0.0
     assert np.array_equal(part.logged[ANGLE], r[ANGLE][100:250])
     assert np.allclose(part.logged["time_s"] - part.time_s, (uneven - r.time_s)[100:250])
+
+
+def several(case, *, copies: int, times: int):
+    """The case with its recording repeated, and that so many times as recordings of their own."""
+    r = longer(case, still=0, times=times).recordings[0]
+    return replace(case, recordings=tuple(replace(r, file=f"{j}.csv") for j in range(copies)))
+
+
+def test_rows_that_a_search_leaves_out_are_held_out(case):
+    given = several(case, copies=2, times=1 + 2 * SEARCH_ROWS // case.recordings[0].rows)
+    found, findings = with_excerpts(given)
+    assert sum(r.rows for r in found.identification) <= MOST_SEARCH_ROWS
+    assert len(found.validation) == len(findings) == 2
+    for one, rest in zip(found.identification, found.validation, strict=True):
+        whole = given.recordings[0][ANGLE]
+        assert one.file == rest.file
+        assert not rest.initial_rest
+        assert one.rows + rest.rows <= whole.size
+        assert np.array_equal(rest[ANGLE], whole[-rest.rows :])
+
+
+def test_a_search_fits_all_rows_of_a_short_case(case):
+    assert with_excerpts(case) == (case, ())
+
+
+def test_few_rows_show_whole_cycles_of_some_recordings_and_the_last_is_left_out(case):
+    """Beginnings of all of them would show no cycle of any."""
+    r = several(case, copies=1, times=2).recordings[0]
+    slow = {n: np.repeat(v, 40) for n, v in r.columns.items()}
+    slow["time_s"] = r.sample_time_s * np.arange(slow["time_s"].size)
+    given = replace(
+        case, recordings=(*several(case, copies=3, times=2).recordings,
+                          replace(r, file="slow.csv", columns=slow, logged=None)),
+    )  # fmt: skip
+    found, findings = brief_case(given)
+    assert {r.file for r in found.identification} <= {"0.csv", "1.csv", "2.csv"}
+    assert any(f.file == "slow.csv" and f.text.startswith("not fitted") for f in findings)
