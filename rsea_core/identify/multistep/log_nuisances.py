@@ -124,6 +124,7 @@ def _lags(case: Case) -> tuple[Law, ...]:
                 name="time_s", unit="s", low=1e-3 * row, high=50.0 * row, scale=0.2 * row,
                 prior=5.0 * row,
             )  # fmt: skip
+            second = replace(lag, name="second_time_s", low=0.0)
             found.append(
                 Law(
                     effect=FILTER,
@@ -131,8 +132,8 @@ def _lags(case: Case) -> tuple[Law, ...]:
                     subsystem=f"sensor:{column}",
                     sensor=column,
                     write=writes_reading(column, _filtered),
-                    unknowns=(lag,),
-                    starts=((row,),),
+                    unknowns=(lag, second),
+                    starts=((row, 0.0),),
                     nuisance=True,
                 )
             )
@@ -140,12 +141,22 @@ def _lags(case: Case) -> tuple[Law, ...]:
 
 
 def _filtered(v, signal: NDArray, w: RunConditions) -> NDArray:
-    """A signal behind a filter of first order, settled at its first row."""
+    """A signal, linear between rows, behind two filters of first order, settled at its first row.
+
+    Drives filter a speed that they differentiate, and many filter it once more for the log. The
+    equations are exact for such a signal (ramp-invariant: Franklin, Powell, Workman, Digital Control
+    of Dynamic Systems (1998), section 6.3.2).
+    """
     from scipy.signal import lfilter  # takes a second to import, rarely needed
 
-    share = 1.0 - np.exp(-float(np.mean(np.diff(w.time_s))) / v["time_s"])
-    start = [(1.0 - share) * signal[0]]
-    return lfilter([share], [1.0, share - 1.0], signal, zi=start)[0]
+    row_s = float(np.mean(np.diff(w.time_s)))
+    for time_s in (v["time_s"], v["second_time_s"]):
+        if time_s > 0.0:
+            kept = np.exp(-row_s / time_s)
+            mean = time_s / row_s * (1.0 - kept)
+            start = [mean * signal[0]]
+            signal = lfilter([1.0 - mean, mean - kept], [1.0, -kept], signal, zi=start)[0]
+    return signal
 
 
 def _ratio_rounding(case: Case) -> tuple[Law, ...]:
