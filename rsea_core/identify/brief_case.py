@@ -115,7 +115,7 @@ def with_excerpts(case: Case) -> tuple[Case, tuple[Finding, ...]]:
             recordings.append(r)
             continue
         moving = _from_first_motion(case, r, limit)
-        rest = rows_between(moving, limit, moving.rows)
+        rest = rows_between(moving, limit, moving.rows, keep_time=True)
         recordings += [
             rows_between(moving, 0, limit),
             replace(rest, role="validation", initial_rest=False),

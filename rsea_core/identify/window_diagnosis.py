@@ -13,6 +13,7 @@ from rsea_core.identify.clamped_loads import with_yielding_clamps
 from rsea_core.identify.investigate import investigate
 from rsea_core.identify.law_search.found import Found
 from rsea_core.identify.law_search.gear_mesh import as_effect
+from rsea_core.identify.law_search.hold_out import predicts_rest
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.command_timing import CommandTiming, RowTimes
 from rsea_core.identify.multistep.criteria import SURE
@@ -72,7 +73,7 @@ def diagnose_windows(
         searched = with_stated_form(searched, say, quick=quick)
         found = investigate(searched, quick=quick, say=say)
     conclusion = WindowVerdict(found, searched if quick else case, say)
-    if cut and not quick and conclusion.verdict not in EXPLAINS:
+    if cut and not quick and not (conclusion.verdict in EXPLAINS and predicts_rest(found)):
         say("the rows held out are not explained: searched again with all rows")
         cut = ()
         with limited_work(most_work) as work:

@@ -68,15 +68,19 @@ def common_limit(sizes: Sequence[float], most: float) -> float:
     return float("inf")
 
 
-def rows_between(r: Recording, first: int, end: int) -> Recording:
-    """The rows from `first` up to `end` of a recording, of its log as well, from time 0 on."""
+def rows_between(r: Recording, first: int, end: int, *, keep_time: bool = False) -> Recording:
+    """The rows from `first` up to `end` of a recording, of its log as well, from time 0 on.
+
+    keep_time : on from the time of the first of them
+    """
     columns = {name: read_only(values[first:end].copy()) for name, values in r.columns.items()}
     begin, last = columns["time_s"][0], columns["time_s"][-1]
-    columns["time_s"] = read_only(columns["time_s"] - begin)
+    zero = 0.0 if keep_time else begin
+    columns["time_s"] = read_only(columns["time_s"] - zero)
     logged = r.logged
     if logged is not None:
         reach = 0.5 * r.sample_time_s
         kept = (logged["time_s"] >= begin - reach) & (logged["time_s"] <= last + reach)
         logged = {name: read_only(values[kept]) for name, values in logged.items()}
-        logged["time_s"] = read_only(logged["time_s"] - begin)
+        logged["time_s"] = read_only(logged["time_s"] - zero)
     return replace(r, columns=columns, logged=logged)

@@ -55,6 +55,7 @@ from rsea_core.recordings.recording import Recording
 
 SHARED, LAST = 2.0 / 3.0, 0.25  # of a recording's rows
 LEAST_WINDOWS = 3  # for a standard error
+MOST_OF_REST = 2.0  # mean squared innovations over the largest of those fitted
 PAUSES_s = (1.0, 30.0, 300.0, 3000.0)  # trial values of the pause between two recordings
 
 
@@ -297,6 +298,25 @@ def free_run(found: Found, e: Experiment, trial: tuple[Hypothesis, NDArray]) -> 
     whole = windows_of(e.rows, e.rows, tracks[0].motion)
     machine = [found.problem.trial_machine(e, h, x)]
     return e.readings(e.runs(machine, whole), machine, whole)[0]
+
+
+def predicts_rest(found: Found) -> bool:
+    """Whether the rows held out of recordings that are fitted are predicted as well as the others.
+
+    By the mean squared innovations in windows of one time scale: the rest begins in motion, and
+    where nothing pulls a machine back a small error of its start prevails in longer ones.
+    """
+    trial, fitted = (found.best.hypothesis, found.best.x), found.problem.fitted
+    files = {e.recording.file for e in fitted}
+    unseen = [b for b in found.problem.prepared if b.recording.role == "validation"]
+    rest = [e for e in unseen if e.recording.file in files]
+    if not rest:
+        return True
+    means = []
+    for experiments in (fitted, rest):
+        own = of_recordings(found, experiments, trial, PREDICTABLE)
+        means.append([float(np.mean(huber_squares(e[0]))) for e in own.innovations([trial])])
+    return max(means[1]) < MOST_OF_REST * max(*means[0], 1.0)
 
 
 def _power(innovations: list[NDArray]) -> float:

@@ -144,8 +144,8 @@ def _filtered(v, signal: NDArray, w: RunConditions) -> NDArray:
     """A signal, linear between rows, behind two filters of first order, settled at its first row.
 
     Drives filter a speed that they differentiate, and many filter it once more for the log. The
-    equations are exact for such a signal (ramp-invariant: Franklin, Powell, Workman, Digital Control
-    of Dynamic Systems (1998), section 6.3.2).
+    equations are exact for such a signal (ramp-invariant: Franklin, Powell and Workman, Digital
+    Control of Dynamic Systems (1998), section 6.3.2).
     """
     from scipy.signal import lfilter  # takes a second to import, rarely needed
 
@@ -208,7 +208,7 @@ def _on_own_clock(v, signal: NDArray, w: RunConditions) -> NDArray:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _drifted(time, signal, rate):
-    """Signal (n,) at times that run off by a share `rate`, to first order."""
+    """Signal (n,) at times that run off by a share `rate` from time 0 on, to first order."""
     n, out = len(time), np.empty(len(time))
     for i in range(n):
         before, after = max(i - 1, 0), min(i + 1, n - 1)
@@ -218,5 +218,5 @@ def _drifted(time, signal, rate):
         else:  # of the parabola through three rows
             up, down = (signal[after] - signal[i]) / right, (signal[i] - signal[before]) / left
             slope = (left * up + right * down) / (left + right)
-        out[i] = signal[i] + rate * (time[i] - time[0]) * slope
+        out[i] = signal[i] + rate * time[i] * slope
     return out

@@ -75,8 +75,10 @@ def unpredicted_recordings(found: Found) -> list[str]:
     own = in_sensor_noise(found.base_estimator, found.base)
     plain = own.fit(found.base.hypothesis, found.base.x, iterations=12)
     trial = plain.hypothesis, plain.x
-    files = []
+    files, fitted = [], {b.recording.file for b in found.problem.fitted}
     for t in recordings_held_out(found, own, trial).tracks:
+        if t.experiment.recording.file in fitted:  # the rest of one: `hold_out.predicts_rest`
+            continue
         one, most = own.having([t]), 0.5 * SOUND**2 * t.blocks * len(t.experiment.channels)
         if _cost(one, *trial) > most and predicted_cost(one, own, *trial) > most:
             files.append(t.experiment.recording.file)

@@ -21,7 +21,7 @@ def recording(noise: float):
 
 
 def test_without_noise_it_is_the_rate_of_a_sine():
-    assert rate_without_noise(recording(0.0)) == pytest.approx(RATE, rel=0.03)  # 3 deviations of chance
+    assert rate_without_noise(recording(0.0)) == pytest.approx(RATE, rel=0.03)
 
 
 def test_noise_of_a_fast_log_does_not_count_as_motion():
