@@ -71,16 +71,16 @@ def run(arguments: argparse.Namespace) -> int:
         raise OutputError(f"{out} is a file; a folder has to be written there")
     if out.exists() and any(out.iterdir()) and not arguments.force:
         raise OutputError(f"{out} exists and is not empty; --force writes into it")
-    rig, terms = stated_rig(arguments.rig)
-    options = replace(options, terms=terms)
+    rig, options = stated_rig(arguments.rig, options)
     known = known_values(arguments.model, arguments.joint, arguments.spring)
     rig = completed(rig, known)
     columns = labelled_columns(groups[0], options)
     can_ask = sys.stdin.isatty() and not arguments.yes
     proposal = decided(columns, rig, options, arguments.logs[0], _ask if can_ask else None)
     if proposal.questions and rig is not None and not (can_ask or arguments.yes):
-        refuse(proposal.questions)
-    proposal = replace(proposal, notes=(*proposal.notes, *unread_text(groups[0])))
+        refuse(proposal.questions, options.notes)
+    notes = (*options.notes, *proposal.notes, *unread_text(groups[0]))
+    proposal = replace(proposal, notes=notes)
     listed = [r for group in groups for r in listed_recordings(group, proposal, rig, options)]
     channels = channels_of(groups[0])
     made = read_with_starts(

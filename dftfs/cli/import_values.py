@@ -1,29 +1,39 @@
 """What the user states to `dftfs import`: windows, known parts; its questions."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
 from dftfs.errors import DftfsError
 from rsea_core.errors import RigError
 from rsea_core.files.toml_tables import read_toml
+from rsea_core.importing.case_maker import ImportOptions
 from rsea_core.importing.robot_model import rig_values
+from rsea_core.importing.stated_map import is_proposed
 from rsea_core.machine.rig import Rig
-from rsea_core.recordings.recording import ROLES
-from rsea_core.terms.known import KnownTerm, known_terms
+from rsea_core.recordings.column_map import column_map
+from rsea_core.recordings.recording import COLUMNS, ROLES
+from rsea_core.terms.known import known_terms
 
 MOST_ASKED = 8
+PROPOSAL = (
+    "[columns] of {} was proposed without values of the machine and is decided anew; delete its"
+    " line proposed = true if it is right"
+)
 
 
-def refuse(questions: Sequence[str]) -> NoReturn:
-    """Print the first questions, a line each, and end: nobody is there to answer them.
+def refuse(questions: Sequence[str], notes: Sequence[str] = ()) -> NoReturn:
+    """Print notes and the first questions, a line each, and end: nobody is there to answer them.
 
     Raises
     ------
     DftfsError
         With their number.
     """
+    for note in notes:
+        print(f"note: {note}", file=sys.stderr)
     for question in questions[:MOST_ASKED]:
         print(f"question: {question}", file=sys.stderr)
     if len(questions) > MOST_ASKED:
@@ -62,11 +72,21 @@ def known_values(
     return known
 
 
-def stated_rig(given: str | None) -> tuple[Rig | None, tuple[KnownTerm, ...]]:
-    """The rig of a preset's name or a file, and the physics that the file states beside it."""
+def stated_rig(given: str | None, options: ImportOptions) -> tuple[Rig | None, ImportOptions]:
+    """The rig of a preset's name or a file, and the options with what the file states beside it."""
     if given is None:
-        return None, ()
+        return None, options
     if not given.endswith(".toml"):
-        return Rig.preset(given), ()
-    rig = Rig.from_toml(given)
-    return rig, known_terms(read_toml(given, RigError), rig, given)
+        return Rig.preset(given), options
+    rig, tables = Rig.from_toml(given), read_toml(given, RigError)
+    options = replace(options, terms=known_terms(tables, rig, given))
+    columns = tables.get("columns")
+    if not isinstance(columns, Mapping):
+        return rig, options
+    if is_proposed(columns):
+        return rig, replace(options, notes=(PROPOSAL.format(given),))
+    stated = column_map(columns, COLUMNS, f"{given}: [columns]")
+    return rig, replace(
+        options, columns=columns, joint=options.joint or stated.joint,
+        rate_Hz=options.rate_Hz or stated.rate_Hz,
+    )  # fmt: skip

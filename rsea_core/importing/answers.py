@@ -14,8 +14,12 @@ from rsea_core.recordings.column_map import ColumnSource, column_map, for_rig
 from rsea_core.recordings.recording import COLUMNS
 from rsea_core.recordings.units import factor_and_offset, unit_of_column
 
-REFERENCE = "reference"
-FORM = 'NAME=COLUMN:UNIT[:SIGN], NAME={ name = "COLUMN", scale = 2.0 }, or reference=COLUMN'
+REFERENCE, LEFT_OUT = "reference", "ignore"
+FORM = (
+    'NAME=COLUMN:UNIT[:SIGN], NAME={ name = "COLUMN", scale = 2.0 }, reference=COLUMN, or'
+    " ignore=COLUMN"
+)
+PERCENT = ("percent", "%", "pct", "permille")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,10 +32,13 @@ class Answer:
         Of a column of the contract; None: `name` is a reference.
     name : str
         The log's column; "" for a formula.
+    is_left_out : bool
+        It is no reference either.
     """
 
     source: ColumnSource | None
     name: str
+    is_left_out: bool = False
 
 
 def parse_answer(text: str, known: Collection[str], rig: Rig | None = None) -> Answer:
@@ -50,17 +57,23 @@ def parse_answer(text: str, known: Collection[str], rig: Rig | None = None) -> A
         If it is written otherwise, or names an unknown column, reading or unit.
     """
     target, equals, value = (part.strip() for part in text.partition("="))
-    if not equals or not value or target not in (*COLUMNS, REFERENCE):
+    if not equals or not value or target not in (*COLUMNS, REFERENCE, LEFT_OUT):
         near = f"; {nearest(target, COLUMNS)}" if equals else ""
         raise RecordingError(f"answer {text!r}: write {FORM}{near}")
-    if target == REFERENCE:
-        return Answer(source=None, name=_known(value, known, text))
+    if target in (REFERENCE, LEFT_OUT):
+        left_out = target == LEFT_OUT
+        return Answer(source=None, name=_known(value, known, text), is_left_out=left_out)
     source = _source(target, value, text, known, rig)
     if source.formula is None:
         _known(source.name, known, text)
     if source.unit is not None:
         linear, counts = is_linear(rig), source.counts_per_rev or 1.0
-        factor_and_offset(source.unit, unit_of_column(target), counts, linear=linear)
+        try:
+            factor_and_offset(source.unit, unit_of_column(target), counts, linear=linear)
+        except RecordingError as problem:
+            if source.unit.lower() not in PERCENT:
+                raise
+            raise RecordingError(f"{problem}; {_of_range(source, rig)}") from problem
     return Answer(source=source, name=source.name)
 
 
@@ -82,6 +95,14 @@ def answer_text(
 def typed(statement: str) -> str:
     """The option of a statement, quoted for a shell."""
     return f"--column {shlex.quote(statement)}"
+
+
+def _of_range(source: ColumnSource, rig: Rig | None) -> str:
+    """How a column in percent of a range is stated."""
+    limit = None if rig is None else rig.current_limit_A
+    one = 0.01 * limit if limit and source.target.startswith("current") else 0.08
+    entry = answer_text(source.target, source.name, unit_of_column(source.target), scale=one)
+    return f"percent of a range: {entry}, where {one:g} is what 1 % is"
 
 
 def quoted(formula: str) -> list[str]:

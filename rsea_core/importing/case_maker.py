@@ -14,6 +14,7 @@ from rsea_core.importing.answers import parse_answer, quoted
 from rsea_core.importing.case_text import ListedRecording, columns_text, parts_of, rig_text
 from rsea_core.importing.proposal import Proposal, answered, propose, why_no_time
 from rsea_core.importing.rest import HELD_SPAN, usual_load, with_rest_as_zero
+from rsea_core.importing.stated_map import stated_answers, with_overrides
 from rsea_core.importing.streams.wraps import without_wraps, wraps_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig, is_linear
@@ -48,6 +49,10 @@ class ImportOptions:
         As `parse_answer` reads them.
     terms : tuple of KnownTerm
         Those of the rig's file.
+    columns : mapping or None
+        Its table `[columns]`.
+    notes : tuple of str
+        What the import says of these.
     """
 
     out: Path
@@ -59,6 +64,8 @@ class ImportOptions:
     parts: tuple[tuple[float, float, str | None], ...] = ()
     answers: tuple[str, ...] = ()
     terms: tuple[KnownTerm, ...] = ()
+    columns: Mapping | None = None
+    notes: tuple[str, ...] = ()
 
 
 def groups_of_paths(
@@ -122,6 +129,12 @@ def decided(
     """
     raw = {n: c.values for n, c in columns.items()}
     answers = [parse_answer(text, raw, rig) for text in options.answers]
+    if options.columns is not None:
+        own = stated_answers(options.columns, columns, rig, options.joint)
+        if options.rate_Hz is not None:
+            own = [a for a in own if a.source is None or a.source.target != "time_s"]
+        answers = with_overrides(own, answers)
+    raw = {n: v for n, v in raw.items() if n not in {a.name for a in answers if a.is_left_out}}
     parts = {n for a in answers if a.source and a.source.formula for n in quoted(a.source.formula)}
     stated = {**dict.fromkeys(parts & set(raw)), **{a.name: a.source for a in answers if a.name}}
     if options.split in raw:
@@ -193,7 +206,7 @@ def listed_recordings(
     if options.split is None:
         return windows_of(base, options)
     time = proposal.column("time_s")
-    time_s = factor_and_offset(time.unit, "s", None)[0] * raw[time.name]
+    time_s = time.scale * factor_and_offset(time.unit, "s", None)[0] * raw[time.name]
     if not options.split:
         parts = lc.parts_at_gaps(time_s)
     elif options.split in raw:
@@ -272,7 +285,10 @@ def case_text(
     ]
     kept = [columns[n] for n in proposal.references if n in columns]
     references = [f"{c.topic}: {c.name}" if c.topic else c.name for c in kept]
-    text = columns_text(entries, references=references, rate_Hz=options.rate_Hz, channels=channels)
+    text = columns_text(
+        entries, references=references, rate_Hz=options.rate_Hz, channels=channels,
+        proposed=rig is None,
+    )  # fmt: skip
     shown = [c.target for c in proposal.columns]
     shown += ["torque_Nm"] if "spring_stiffness_Nm_per_rad" in known else []
     parts = rig.parts if rig else parts_of(shown)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from rsea_core.importing.proposal import ProposedColumn
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import PARTS, QUANTITIES, Rig
+from rsea_core.recordings.column_map import PROPOSED
 from rsea_core.terms.known import KnownTerm
 
 NEEDED = {
@@ -134,14 +135,19 @@ def columns_text(
     references: Sequence[str],
     rate_Hz: float | None,
     channels: Mapping[str, str] | None = None,
+    proposed: bool = False,
 ) -> str:
     """The table `[columns]`.
 
     Parameters
     ----------
     columns : sequence of (column, name in the log, topic)
+    proposed : bool
+        Without values of the machine: to be decided by them.
     """
     lines = ["[columns]"]
+    if proposed:
+        lines.append(f"{PROPOSED} = true  # --rig decides anew; delete this line if it is right")
     if rate_Hz is not None:
         lines.append(f"rate_Hz = {rate_Hz!r}")
     if channels:

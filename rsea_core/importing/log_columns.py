@@ -15,12 +15,11 @@ from rsea_core.files.toml_tables import nearest
 from rsea_core.importing.streams.column_names import name_evidence
 from rsea_core.importing.streams.common_clock import clock_name, require_one_clock, telling_name
 from rsea_core.recordings.column_map import ColumnMap
-from rsea_core.recordings.log_clock import continuous
+from rsea_core.recordings.log_clock import continuous, longest_step
 from rsea_core.recordings.mapped_log import by_channel
 from rsea_core.recordings.readers.log import Log, Stream
 from rsea_core.recordings.readers.messages import STAMP
 
-GAP = 10.0  # times the usual step: a new run begins
 SHORTEST = 0.01  # of the longest stream's rows: settings, not readings
 FEW_READINGS = 100
 JOINT_LIST = "joint_list.txt"
@@ -227,14 +226,21 @@ def _without_joint(name: str, joint: str | None) -> str:
 
 
 def parts_at_gaps(time_s: NDArray) -> list[tuple[float, float]]:
-    """First and last second, since the first row, of runs between gaps or backward steps."""
-    steps = np.diff(time_s)
-    usual = float(np.median(steps))
-    edges = np.flatnonzero((steps > GAP * usual) | (steps <= 0.0)) + 1
-    firsts, lasts = [0, *edges], [*(edges - 1), time_s.size - 1]
+    """First and last second, since the first row, of runs between gaps or backward steps.
+
+    A gap is what `read_recording` refuses in one recording.
+    """
+    edges = np.flatnonzero(np.diff(time_s) < 0.0) + 1
+    open_runs, runs = [(a, b) for a, b in zip([0, *edges], [*edges, time_s.size])], []
+    while open_runs:
+        a, b = open_runs.pop()
+        steps = np.diff(time_s[a:b])
+        gaps = np.flatnonzero(steps > longest_step(steps)) + 1 if steps.size > 1 else ()
+        cuts = [a, *(a + k for k in gaps), b]
+        (open_runs if len(cuts) > 2 else runs).extend(itertools.pairwise(cuts))
     zero = time_s[0]
-    return [(float(time_s[a] - zero), float(time_s[b] - zero)) for a, b in zip(firsts, lasts)
-            if b - a >= 3]  # fmt: skip
+    return [(float(time_s[a] - zero), float(time_s[b - 1] - zero)) for a, b in sorted(runs)
+            if b - a > 3]  # fmt: skip
 
 
 def parts_at_flag(time_s: NDArray, flag: NDArray) -> list[tuple[float, float]]:

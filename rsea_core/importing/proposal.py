@@ -348,7 +348,7 @@ def answered(proposal: Proposal, answer: Answer) -> Proposal:
     named = {c.name for c in kept}
     left = tuple(q for q in proposal.questions if not q.startswith(f"column {name!r}:"))
     references = [n for n in proposal.references if n not in named and n != name]
-    references += [name] if source is None else []
+    references += [name] if source is None and not answer.is_left_out else []
     return replace(
         proposal, columns=tuple(kept), questions=left, references=tuple(references),
         ignored=tuple(n for n in proposal.ignored if n not in named),

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.machine.inputs import POSITION_COMMAND
-from rsea_core.machine.rig import Rig
+from rsea_core.machine.rig import Rig, is_linear
 
 WINDING_TOLERANCE, GEAR_TOLERANCE, SPRING_TOLERANCE = 0.30, 0.12, 0.30
 DERIVATIVE_TOLERANCE, COUNT_TOLERANCE, NOISE_TOLERANCE = 0.08, 0.01, 0.45
@@ -24,6 +24,7 @@ FOLLOWS = 0.95  # correlation of a load that follows its motor
 FEW = 50
 MOST_ROWS = 40_000
 RESOLVED = 8.0  # steps of one size that a moving column has to be long
+MOSTLY = 0.95  # of the moves of a column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,8 +86,21 @@ def step_of(values: NDArray) -> float | None:
         return None
     step = float(np.sum(low) / np.sum(np.round(low / step)))
     multiple = low / step
-    off = np.abs(multiple - np.round(multiple))
-    return step if np.percentile(off, 98.0) < 0.02 * max(1.0, multiple.max() / 20.0) else None
+    whole = np.round(multiple)
+    if np.percentile(np.abs(multiple - whole), 98.0) >= 0.02 * max(1.0, multiple.max() / 20.0):
+        return None
+    # rows that were filled between two neighbours lie at parts of a step
+    parts = next((k for k in (6, 3, 2) if np.mean(whole % k == 0.0) > MOSTLY), 1)
+    one_size = np.mean(whole == parts) > MOSTLY
+    return None if one_size and not _rests_between(values) else parts * step
+
+
+def _rests_between(values: NDArray) -> bool:
+    """Whether a column rests between moves: at one speed all moves are of one size without it."""
+    moves = np.diff(values[:MOST_ROWS]) != 0.0
+    return int(np.sum(~moves[1:-1] & moves[:-2] & moves[2:])) >= RESOLVED or bool(
+        np.mean(moves) < 0.5
+    )
 
 
 def _slow(values: NDArray, window: int) -> NDArray:
@@ -331,12 +345,13 @@ def sensor_laws(
     found = []
     counts = {"motor_angle_rad": rig.motor_encoder_counts_per_rev,
               "load_angle_rad": rig.load_encoder_counts_per_rev}  # fmt: skip
+    per = " (of a linear axis: counts per metre times 2 pi)" if is_linear(rig) else ""
     noises = {"current_A": rig.current_sensor_noise_A, "torque_Nm": rig.torque_sensor_noise_Nm}
     for name, values in c.items():
         step = step_of(values) if counts.get(name) else None
         if step is not None:
             share = step * abs(scale) * counts[name] / (2.0 * np.pi)
-            text = f"{name} moves in steps of {share:.4g} counts of rig.toml's encoder"
+            text = f"{name} moves in steps of {share:.4g} counts of rig.toml's encoder{per}"
             found.append(Law(text=text, ratio=share, tolerance=COUNT_TOLERANCE, columns=(name,)))
         scatter = scatter_of(values) if noises.get(name) and values.size >= FEW else 0.0
         if scatter > 0.0:

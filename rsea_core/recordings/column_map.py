@@ -17,7 +17,8 @@ from rsea_core.machine.rig import Rig, is_linear
 SOURCE_KEYS = (
     "name", "formula", "unit", "sign", "scale", "zero", "side", "counts_per_rev", "topic", "wrap",
 )  # fmt: skip
-MAP_KEYS = ("rate_Hz", "joint", "channels", "reference", "ignore")
+PROPOSED = "proposed"  # true: by a first import, which knew no values of the machine
+MAP_KEYS = ("rate_Hz", "joint", "channels", "reference", "ignore", PROPOSED)
 CHANNEL_KEYS = ("channel", "value", "time")
 SIDES = ("motor", "load")
 
@@ -119,6 +120,8 @@ def column_map(table: Mapping, targets: tuple[str, ...], where: str) -> ColumnMa
             raise RecordingError(f"{where}: rate_Hz = {rate} must be above 0")
         if "time_s" in table:
             raise RecordingError(f"{where}: has rate_Hz and time_s; a log has one clock")
+    if not isinstance(table.get(PROPOSED, True), bool):
+        raise RecordingError(f"{where}: {PROPOSED} = {table[PROPOSED]!r} must be true or false")
     joint = table.get("joint")
     if joint is not None and not isinstance(joint, str | int):
         raise RecordingError(f"{where}: joint = {joint!r} must be a name or a number")

@@ -15,6 +15,10 @@ MODULI = (2.0**16, 2.0**24, 2.0**31, 2.0**32)
 USUAL = 20.0  # times the usual step: what a wrap leaves, and the gap put between two runs
 UNCLEAR = 0.1  # of a turn, around half of one
 RESTART = 0.05  # of the span: how close to its first value a new run begins
+EVEN = 0.05  # steps within this share of their mean are one grid, printed with few digits
+DROPPED = 1.5  # of an otherwise even grid: a longer step has lost a row
+MOST_LOST = 2  # rows in a row that are filled there; more are a gap
+GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
 
 
 def continuous(values: NDArray) -> tuple[NDArray, str | None]:
@@ -42,6 +46,40 @@ def continuous(values: NDArray) -> tuple[NDArray, str | None]:
     jumps[back + 1] = USUAL * usual - steps[back]
     text = f"its time restarts {back.size} times: {back.size + 1} runs, one after the other"
     return values + np.cumsum(jumps), text
+
+
+def longest_step(steps: NDArray) -> float:
+    """The step beyond which a clock has a gap, at which its recording has to be split."""
+    if _is_even(steps):
+        return (MOST_LOST + DROPPED) * float(np.median(steps))
+    return GAP * float(np.percentile(steps, 99.0))
+
+
+def lost_rows(steps: NDArray) -> NDArray:
+    """Rows that an otherwise even clock lacks in each of its (n,) steps; none of a jittery one."""
+    median = float(np.median(steps))
+    long = (steps > DROPPED * median) & _is_even(steps)
+    return np.where(long, np.round(steps / median) - 1.0, 0.0).astype(int)
+
+
+def places_of_rows(time: NDArray, lost: NDArray) -> tuple[NDArray, NDArray, float]:
+    """Where the (m,) rows of a log lie on an even grid with those it lost.
+
+    Returns
+    -------
+    (m,) array, in rows of the grid
+    (n,) array, the rows of the grid
+    float, the time between two of these
+    """
+    at = np.concatenate(([0.0], np.cumsum(1.0 + lost)))
+    mean = float(time[-1] - time[0]) / at[-1]
+    passed = (time - time[0]) / mean
+    drifts = np.max(np.abs(at - passed)) > 0.5
+    return passed if drifts else at, np.arange(at[-1] + 1.0), mean
+
+
+def _is_even(steps: NDArray) -> bool:
+    return float(np.percentile(steps, 95.0)) <= (1.0 + EVEN) * float(np.median(steps))
 
 
 def rows_written_once(columns: Mapping[str, NDArray], clock: str) -> tuple[NDArray, str | None]:

@@ -26,6 +26,7 @@ from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.bench_log import is_bench_log, read_bench_log
 from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.finding import Finding, Kind
+from rsea_core.recordings.log_clock import EVEN, longest_step, lost_rows, places_of_rows
 from rsea_core.recordings.mapped_log import columns_of_log, identity_map
 
 RESPONSES = (
@@ -41,11 +42,8 @@ CONDITIONS = ("temperature_C", "supply_V", "drive_enabled")
 COLUMNS = ("time_s", *COMMANDS, *RESPONSES, *CONDITIONS)
 HELD = (*COMMANDS, "drive_enabled")  # held from row to row; the others are sampled signals
 ROLES = ("identification", "validation")
-EVEN = 0.05  # steps within this share of their mean are one grid, printed with few digits
-DROPPED = 1.5  # of an otherwise even grid: a longer step has lost a sample
 LARGEST = 1e9  # in SI no reading of a machine is larger
 COLDEST_C = -273.15
-GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -248,8 +246,11 @@ def _window_label(window_s: tuple[float | None, float | None]) -> str:
 
 
 def _moved(logged: NDArray, grid: NDArray, step_s: float) -> bool:
-    """Whether the times of the log were other than those of the grid, but for printed digits."""
-    return bool(np.max(np.abs(logged - grid)) > 2e-3 * step_s)
+    """Whether the times of the log were other than those of the grid, but for printed digits.
+
+    Times of an even grid with a few rows filled are the grid's.
+    """
+    return logged.size == grid.size and bool(np.max(np.abs(logged - grid)) > 2e-3 * step_s)
 
 
 def _read_csv(path: Path) -> dict[str, NDArray]:
@@ -353,28 +354,46 @@ def _even(path: Path, columns: Mapping[str, NDArray], quasi_static: bool):
     mean = float(time[-1] - time[0]) / steps.size
     if quasi_static:
         return dict(columns), mean, ()
-    median = float(np.median(steps))
-    even = float(np.percentile(steps, 95.0)) <= (1.0 + EVEN) * median
-    limit = DROPPED * median if even else GAP * float(np.percentile(steps, 99.0))
+    limit = longest_step(steps)
     if steps.max() > limit:
         k = int(np.argmax(steps > limit))
         raise RecordingError(
             f"{path}: column time_s, row {k + 3}: gap of {steps[k]:.6g} s where samples are"
-            f" {median:.6g} s apart; split the recording there (dftfs import --split)"
+            f" {np.median(steps):.6g} s apart; split the recording there (dftfs import --split)"
         )
+    lost = lost_rows(steps)
+    if lost.any():
+        return _filled(path, columns, lost)
     grid = time[0] + mean * np.arange(time.size)
     if np.max(np.abs(steps - mean)) <= EVEN * mean and np.max(np.abs(grid - time)) <= 0.5 * mean:
         return {**columns, "time_s": grid}, mean, ()
     grid[-1] = time[-1]
-    before = np.searchsorted(time, grid + 1e-9 * mean, side="right") - 1
-    resampled = {
-        name: values[before] if name in HELD else np.interp(grid, time, values)
-        for name, values in columns.items()
-    }
-    resampled["time_s"] = grid
+    resampled = {**_at(grid, time, columns, 1e-9 * mean), "time_s": grid}
     text = (
         f"sample times vary by {100 * np.std(steps) / mean:.1f} % (largest step"
         f" {steps.max() * 1e3:.3g} ms); resampled to {mean * 1e3:.4g} ms"
     )
     note = Finding(kind=Kind.RESAMPLED, text=text, file=path.name, column="time_s")
     return resampled, mean, (note,)
+
+
+def _at(grid: NDArray, at: NDArray, columns: Mapping[str, NDArray], least: float):
+    """The columns on a grid: held from row to row, or by straight lines."""
+    before = np.searchsorted(at, grid + least, side="right") - 1
+    return {
+        name: values[before] if name in HELD else np.interp(grid, at, values)
+        for name, values in columns.items()
+    }
+
+
+def _filled(path: Path, columns: Mapping[str, NDArray], lost: NDArray):
+    """As `_even`, for an even clock that lacks a row now and then: these are filled."""
+    time = columns["time_s"]
+    at, rows, mean = places_of_rows(time, lost)
+    filled = _at(rows, at, columns, 1e-9) | {"time_s": time[0] + mean * rows}
+    text = (
+        f"{lost.sum()} of {rows.size} rows were lost, {lost.max()} in a row at most; filled from"
+        f" their neighbours, {mean * 1e3:.4g} ms apart"
+    )
+    note = Finding(kind=Kind.READER, text=text, file=path.name, column="time_s")
+    return filled, mean, (note,)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 TERMS = {
     "time": "t time times timestamp timestamps stamp clock zeit tick ticktime log "
     "temps tiempo tempo uhrzeit",
-    "duty": "duty pwm dutycycle bridge tastgrad tastverhaltnis",
+    "duty": "duty pwm dutycycle bridge tastgrad tastverhaltnis stellgrad",
     "supply": "supply vbus vbat ubat battery bus vdc vsupply",
     "voltage": "voltage volt volts v u vcmd vq umot uq ucmd vmot uset vset uref vref usoll "
     "spannung",
