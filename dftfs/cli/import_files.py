@@ -6,21 +6,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from dftfs.cli.common import emit, table
+from dftfs.cli.import_preview import HEADER, PREVIEW, notes_of, write_preview
 from dftfs.files import OutputError, write_text
-from dftfs.report.page_data import write_page
-from dftfs.report.provenance import case_provenance
 from rsea_core.errors import RecordingError, RigError, RseaError
-from rsea_core.importing.case_text import NEEDED, ListedRecording, missing_values, parts_of
-from rsea_core.importing.doctor.slip_catalogue import case_slips
+from rsea_core.importing.case_text import NEEDED, ListedRecording, missing_values
 from rsea_core.importing.proposal import Proposal
 from rsea_core.importing.rest import load_of, starts_in_motion
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, read_case
-from rsea_core.recordings.finding import grouped_sentences
-from rsea_core.recordings.quality_checks import data_warnings
 
-RIG, PREVIEW = "rig.toml", "preview.html"
-HEADER = ("reading", "column", "unit", "sure", "why")
+RIG = "rig.toml"
 
 
 def read_back(out: Path, text: str) -> tuple[Case | None, str | None]:
@@ -89,41 +84,27 @@ def write_case(
 ) -> int:
     """Write rig file and preview; print the columns, what is taken, noted and missing."""
     text, case, problem = made
-    notes: list[str] = []
-    if case is not None:
-        found = (*case.notes(), *data_warnings(case), *case_slips(case))
-        notes = list(dict.fromkeys(grouped_sentences(found)))
+    notes = [] if case is None else notes_of(case)
     rows = [
         (c.target, c.name, f"{'-' if c.sign < 0 else ''}{c.unit}", f"{c.confidence:.0%}", c.reason)
         for c in proposal.columns
     ]
     out.mkdir(exist_ok=True)
     if case is not None:
-        plots = [(r.file, r.time_s, {n: r[n] for n in r.columns if n != "time_s"} | _raw(r))
-                 for r in case.recordings]  # fmt: skip
-        shown = {"head": HEADER, "rows": rows, "notes": notes, "facts": case_provenance(case)}
-        title = f"{out.name}: imported"
-        write_page(out / PREVIEW, "recordings", title=title, recordings=plots, **shown)
+        write_preview(out, case, rows, notes)
     write_text(out / RIG, text)
-    missing = missing_values(rig, parts_of([c.target for c in proposal.columns]))
+    loads = None if case is None else {r.load.kind for r in case.recordings}
+    missing = missing_values(rig, [c.target for c in proposal.columns], loads)
     state = "taken without asking" if rig is not None else "not decided yet"
     lines = [table(HEADER, rows), *(f"{state}: {q}" for q in proposal.questions)]
     lines += [f"reference, not fitted: {', '.join(proposal.references or ('none',))}"]
     notes = [*proposal.notes, *notes]
     lines += [f"note: {note}" for note in notes]
-    lines += [f"missing in [rig]: {key}: {NEEDED[key]}" for key in missing]
+    listed = "; ".join(f"{key} ({NEEDED[key]})" for key in missing)
+    lines += [f"missing in [rig]: {listed}"] if missing else []
     lines += [f"not complete yet: {problem}"] if problem else []
     lines += [str(out / RIG), *([str(out / PREVIEW)] if case is not None else [])]
     value = {"case": out, "columns": rows, "questions": proposal.questions, "notes": notes,
              "missing": missing}  # fmt: skip
     emit(value, "\n".join(lines), as_json=as_json)
     return 0
-
-
-def _raw(recording) -> dict:
-    """References, as logged, where they have as many rows as the recording."""
-    return {
-        f"{name} (reference)": values
-        for name, values in recording.references.items()
-        if values.size == recording.rows
-    }

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from dftfs.cli.common import progress
 from dftfs.cli.import_files import RIG, read_with_starts, write_case
+from dftfs.cli.import_preview import PREVIEW, mapped_rows, notes_of, write_preview
 from dftfs.cli.import_values import known_values, refuse, stated_rig, window_of
 from dftfs.errors import DftfsError
 from dftfs.files import OutputError, write_text
@@ -27,7 +28,6 @@ from rsea_core.importing.case_maker import (
 )
 from rsea_core.importing.case_text import recording_text
 from rsea_core.importing.log_columns import channels_of
-from rsea_core.recordings.quality_checks import data_warnings
 from rsea_core.recordings.recording import ROLES
 
 
@@ -113,7 +113,8 @@ def _add_to_case(groups, options: ImportOptions) -> int:
     if case is None:
         raise DftfsError(f"{problem}")
     write_text(path, text)
+    notes = notes_of(case)
+    write_preview(options.out, case, mapped_rows(tables["columns"]), notes)
     print(f"{path}: {len(listed)} more recordings with the existing map")
-    for finding in data_warnings(case):
-        print(f"note: {finding.sentence()}")
+    print("\n".join([*(f"note: {note}" for note in notes), str(options.out / PREVIEW)]))
     return 0

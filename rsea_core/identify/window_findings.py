@@ -11,7 +11,11 @@ from rsea_core.identify.multistep.tracks import Track
 from rsea_core.recordings.finding import Finding, Kind
 
 ROWS = (Kind.JUMP, Kind.SPIKE)  # findings about single rows
-INCONSISTENT = (Kind.SIGN, Kind.UNIT)  # about a reading that others or the rig file contradict
+INCONSISTENT = (
+    Kind.SIGN,
+    Kind.AGAINST,
+    Kind.UNIT,
+)  # about a reading that others or the rig file contradict
 
 
 def stands(

@@ -145,7 +145,7 @@ def decided(
     try:
         scaled = {n: _as_stated(v, stated.get(n)) for n, v in raw.items()}
         with np.errstate(over="ignore", invalid="ignore"):  # absurd cells are refused later
-            proposal = propose(scaled, units, rig, stated)
+            proposal = propose(scaled, units, rig, stated, options.terms)
     except RecordingError as problem:
         raise RecordingError(f"{path}: {problem}") from problem
     if proposal.rate_needed:
@@ -292,5 +292,6 @@ def case_text(
     shown = [c.target for c in proposal.columns]
     shown += ["torque_Nm"] if "spring_stiffness_Nm_per_rad" in known else []
     parts = rig.parts if rig else parts_of(shown)
-    more = {"is_servo": proposal.column(POSITION_COMMAND) is not None, "terms": options.terms}
+    more = {"is_servo": proposal.column(POSITION_COMMAND) is not None, "terms": options.terms,
+            "targets": shown}  # fmt: skip
     return rig_text(rig, options.out.name, parts, text, listed, known, **more)

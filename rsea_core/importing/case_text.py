@@ -1,12 +1,12 @@
 """The rig file of an imported log, with a comment on every decision and every missing value."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from rsea_core.importing.proposal import ProposedColumn
 from rsea_core.machine.inputs import POSITION_COMMAND
-from rsea_core.machine.rig import PARTS, QUANTITIES, Rig
+from rsea_core.machine.rig import PARTS, QUANTITIES, Rig, is_linear
 from rsea_core.recordings.column_map import PROPOSED
 from rsea_core.terms.known import KnownTerm
 
@@ -30,6 +30,21 @@ NEEDED = {
     "torque_sensor_noise_Nm": "how far the torque can be trusted",
     "current_sensor_noise_A": "how far the current can be trusted",
 }
+_VOLTS = ("duty", "voltage_V")
+COLUMNS_OF = {
+    "supply_voltage_V": ("duty",),
+    "terminal_resistance_ohm": _VOLTS,
+    "terminal_inductance_H": _VOLTS,
+    "back_emf_constant_Vs_per_rad": _VOLTS,
+    "torque_constant_Nm_per_A": (*_VOLTS, "current_A", "current_command_A"),
+    "current_limit_A": (*_VOLTS, "current_A", "current_command_A"),
+    "motor_encoder_counts_per_rev": ("motor_angle_rad",),
+    "load_encoder_counts_per_rev": ("load_angle_rad",),
+    "torque_sensor_noise_Nm": ("torque_Nm",),
+    "current_sensor_noise_A": ("current_A",),
+}
+"""Values that only these columns need."""
+GRAVITY = {"load_mass_kg", "load_distance_m"}
 FRICTION_HINT = """\
 # Known dry friction is a term (gear-friction: at the motor; load-friction: at the load):
 # [[term]]
@@ -81,12 +96,30 @@ def parts_of(targets: Sequence[str]) -> tuple[str, ...]:
     return tuple(part for part in PARTS if owns[part] & set(targets))
 
 
-def missing_values(rig: Rig | None, parts: Sequence[str]) -> list[str]:
-    """Keys of `[rig]` that these parts have and that are not known."""
+def missing_values(
+    rig: Rig | None, targets: Sequence[str], loads: Collection[str] | None = None
+) -> list[str]:
+    """Keys of `[rig]` that the columns and loads of a case need and that are not known.
+
+    Parameters
+    ----------
+    loads : collection of str, optional
+        Of its recordings; None: any.
+    """
+    parts = parts_of(targets) if rig is None else rig.parts
+    unneeded = {key for key, names in COLUMNS_OF.items() if not set(names) & set(targets)}
+    if (loads is not None and "pendulum" not in loads) or is_linear(rig):
+        unneeded |= GRAVITY
+    if "spring" not in parts:
+        unneeded |= {"output_inertia_kgm2"}  # part of the load's
+    if rig is not None and rig.torque_constant_Nm_per_A:
+        unneeded |= {"back_emf_constant_Vs_per_rad"}  # one number
     return [
         key
         for key in NEEDED
-        if QUANTITIES[key]["part"] in (*parts, "any") and (rig is None or getattr(rig, key) is None)
+        if QUANTITIES[key]["part"] in (*parts, "any")
+        and key not in unneeded
+        and (rig is None or getattr(rig, key) is None)
     ]
 
 
@@ -100,6 +133,7 @@ def rig_text(
     *,
     is_servo: bool = False,
     terms: Sequence[KnownTerm] = (),
+    targets: Sequence[str] = (),
 ) -> str:
     """The whole rig file.
 
@@ -109,6 +143,8 @@ def rig_text(
         Values of a robot model, where there is no rig.
     terms : sequence of KnownTerm
         Those of the rig's file.
+    targets : sequence of str
+        The columns of the contract that the log has.
     """
     lines = ["# Made by `dftfs import`. Values marked ... are missing: fill in what you know."]
     if rig is not None:
@@ -120,7 +156,8 @@ def rig_text(
         lines += ["[rig]", f"name = {json.dumps(name)}", f"parts = {json.dumps(list(parts))}"]
         lines += ['servo = "angle"  # its drive closes a position loop'] if is_servo else []
         lines += [f"{key} = {value!r}  # {source}" for key, (value, source) in known.items()]
-    missing = [key for key in missing_values(rig, parts) if key not in known]
+    loads = {r.load for r in recordings}
+    missing = [key for key in missing_values(rig, targets, loads) if key not in known]
     lines += [PLACEHOLDER.format(key=key, why=NEEDED[key]) for key in missing]
     lines += ["", *(term.to_toml() for term in terms)]
     lines += [FRICTION_HINT] if rig is None else []

@@ -3,11 +3,13 @@
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
+from rsea_core.importing.motion_evidence import motion_laws
 from rsea_core.importing.streams.column_names import NameEvidence
 from rsea_core.importing.unit_evidence import (
     FOLLOWS,
@@ -16,7 +18,6 @@ from rsea_core.importing.unit_evidence import (
     current_laws,
     derivative_laws,
     gear_laws,
-    motion_laws,
     sensor_laws,
     servo_laws,
     spring_laws,
@@ -26,6 +27,7 @@ from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig, is_linear
 from rsea_core.recordings.column_map import counts_of
 from rsea_core.recordings.units import factor_and_offset, unit_of_column
+from rsea_core.terms.known import KnownTerm
 
 UNITS: Mapping[str, tuple[tuple[str, float], ...]] = {
     "time": (("s", 0.0), ("ms", -0.3), ("us", -0.6), ("ns", -0.6)),
@@ -198,7 +200,10 @@ def _range_prior(target: str, factor: float, raw: NDArray, rig: Rig | None) -> f
 
 
 def best_hypothesis(
-    rig: Rig | None, raw: Mapping[str, NDArray], assignments: Sequence[Mapping[str, list[Choice]]]
+    rig: Rig | None,
+    raw: Mapping[str, NDArray],
+    assignments: Sequence[Mapping[str, list[Choice]]],
+    terms: Sequence[KnownTerm] = (),
 ) -> Posterior:
     """The most probable choices of all columns together.
 
@@ -208,6 +213,8 @@ def best_hypothesis(
         As logged.
     assignments : sequence of mapping of column name to its choices
         Alternative meanings of the columns, each with the choices of unit and side.
+    terms : sequence of KnownTerm
+        Friction and springs that the rig file states.
 
     Raises
     ------
@@ -216,7 +223,7 @@ def best_hypothesis(
     """
     if not assignments:
         raise RecordingError("the units that the log states fit no reading that its names are of")
-    reader = _Laws(rig, raw)
+    reader = _Laws(rig, raw, terms)
     found: list[tuple[float, tuple[Choice, ...]]] = []
     for assignment in assignments:
         names = list(assignment)
@@ -260,7 +267,9 @@ def _pruned(free: list[list[Choice]]) -> list[list[Choice]]:
 class _Laws:
     """Scores of laws, each computed once for the choices that it depends on."""
 
-    def __init__(self, rig: Rig | None, raw: Mapping[str, NDArray]):
+    def __init__(
+        self, rig: Rig | None, raw: Mapping[str, NDArray], terms: Sequence[KnownTerm] = ()
+    ):
         self.rig = rig
         self.ratio = 1.0 if rig is None else rig.gear_ratio or 1.0
         rows = max(v.size for v in raw.values())
@@ -272,8 +281,9 @@ class _Laws:
             (winding_laws, ("time_s", "duty", "voltage_V", "current_A", "motor_angle_rad",
                             "motor_velocity_rad_per_s", "load_angle_rad",
                             "load_velocity_rad_per_s")),
-            (motion_laws, ("time_s", "current_command_A", "duty", "voltage_V", "motor_angle_rad",
-                           "load_angle_rad")),
+            (partial(motion_laws, terms=terms),
+             ("time_s", "current_command_A", "duty", "voltage_V", "current_A", "motor_angle_rad",
+              "load_angle_rad")),
             (spring_laws, ("time_s", "motor_angle_rad", "load_angle_rad", "torque_Nm",
                            "spring_deflection_rad")),
         ]  # fmt: skip

@@ -5,7 +5,7 @@ question instead of a guess. Signs make every law positive; which direction is c
 the whole machine is the owner's choice and cannot be seen.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,13 +26,16 @@ from rsea_core.machine.rig import Rig, is_linear
 from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.column_map import ColumnSource
 from rsea_core.recordings.readers.log import LOG_TIME
+from rsea_core.recordings.recording import COLUMNS
 from rsea_core.recordings.units import unit_of_column
+from rsea_core.terms.known import KnownTerm
 
 ASK_BELOW = 0.9
 BROKEN, BROKEN_ALONE = 2.5, 4.0  # standard deviations of a law, of one of a single reading
 SOURCES = ("motor_angle_rad", "load_angle_rad", "spring_deflection_rad", "current_A")
 EXACTLY = 1e-4  # of its scatter: no sensor follows an angle as closely
 LENGTHS = ("m", "mm", "um")  # what a scale counts in can only be seen beside another reading
+GUESSED = ("torque_Nm", "motor_torque_Nm")  # what a drive calls torque is often a current in %
 STAMPS = ("ts", "tstamp", "t_stamp")  # a time where it rises evenly, a spring's torque elsewhere
 COMPUTED = "computed, no sensor measured it; kept as a reference"
 
@@ -106,6 +109,7 @@ def propose(
     units: Mapping[str, str],
     rig: Rig | None = None,
     stated: Mapping[str, ColumnSource | None] | None = None,
+    terms: Sequence[KnownTerm] = (),
 ) -> Proposal:
     """What the columns of one log are.
 
@@ -115,6 +119,8 @@ def propose(
         As logged, all of one length.
     units : mapping of column name to the unit that the file states
     stated : mapping of column name to its source (the column is scaled so), None for a reference
+    terms : sequence of KnownTerm
+        Friction and springs that the rig file states.
 
     Raises
     ------
@@ -129,9 +135,8 @@ def propose(
         return Proposal(columns=(), references=(), ignored=(), questions=(), rate_needed=True)
     others = [n for n in whole if n != time and (n in stated or not _counts_rows(whole[n]))]
     assigned, goals, unknown = columns_by_name(others, evidence, rig, stated)
-    if not assigned:
-        assigned = columns_by_derivative(whole, time, rig)
-        unknown = [n for n in unknown if n not in assigned]
+    assigned = assigned or columns_by_derivative(whole, time, rig)
+    unknown = [n for n in unknown if n not in assigned]
     if not assigned:
         raise RecordingError(f"no column is recognised as a reading: {', '.join(list(raw)[:8])}")
 
@@ -139,22 +144,20 @@ def propose(
         found = choices_of(name, target, evidence[name], whole[name], rig)
         return _as_stated(found, stated.get(name))
 
-    foreign = [n for n in assigned if not any(choices(n, t) for t in assigned[n])]
-    assigned = {n: targets for n, targets in assigned.items() if n not in foreign}
-    unknown += foreign  # their units are of no reading
-    tables = [{time: "time_s", **targets} for targets in alternatives(assigned)]
+    fitting = {n: ts for n, ts in assigned.items() if any(choices(n, t) for t in ts)}
+    tables = [{time: "time_s", **targets} for targets in alternatives(fitting)]
     assignments = [{n: choices(n, t) for n, t in table.items()} for table in tables]
-    best = best_hypothesis(rig, whole, [a for a in assignments if all(a.values())])
+    best = best_hypothesis(rig, whole, [a for a in assignments if all(a.values())], terms)
     named = {c.name for c in best.choices}
-    unknown += [n for n in assigned if n not in named]
+    unknown += [n for n in assigned if n not in named]  # some, as their units are of no reading
     made = {c.name: c.target for c in best.choices if _is_computed(c, best, whole, stated)}
     best = best.without(set(made.values()))
-    columns = tuple(c for c in _with_signs(best, whole, rig, evidence) if c.name not in made)
+    columns = [c for c in _with_signs(best, whole, rig, evidence, stated) if c.name not in made]
     moving = [n for n in unknown if np.ptp(whole[n]) > 0.0 and not _counts_rows(whole[n])]
     questions = [_question(c, best) for c in columns if c.asks]
     questions += [_unknown(n) for n in moving]
     return Proposal(
-        columns=columns,
+        columns=tuple(columns),
         references=(*goals, *moving, *made),
         notes=tuple(f"{name} is a sum of other columns: {COMPUTED}" for name in made),
         ignored=tuple(n for n in raw if n not in named and n not in goals and n not in moving),
@@ -230,7 +233,7 @@ def _as_stated(choices: list[Choice], source: ColumnSource | None) -> list[Choic
 
 
 def _with_signs(
-    best: Posterior, raw: Mapping[str, NDArray], rig: Rig | None, evidence
+    best: Posterior, raw: Mapping[str, NDArray], rig: Rig | None, evidence, stated
 ) -> tuple[ProposedColumn, ...]:
     by_target = {c.target: c for c in best.choices}
     signs, seen = signs_of(by_target, raw, rig, best.laws)
@@ -242,7 +245,12 @@ def _with_signs(
         against = c.prior <= STATED + 0.1  # what the log itself states, or any size it can have
         tied = any(c.target in law.columns for law in best.laws)
         against |= c.unit in LENGTHS and evidence[c.name].unit is None and not tied
-        if (against or _broken_law(c.target, best) is not None) and not still:
+        broken = _broken_law(c.target, best)
+        if broken is not None and broken.is_excess and evidence[c.name].unit is not None:
+            broken = None  # friction that nobody stated may need it
+        by_name = rig is not None and c.target in GUESSED and c.name not in (*stated, *COLUMNS)
+        against |= by_name and evidence[c.name].unit is None and not tied
+        if (against or broken is not None) and not still:
             confidence = min(confidence, 0.5)
         columns.append(
             ProposedColumn(

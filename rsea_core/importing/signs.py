@@ -11,6 +11,7 @@ from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig
 
 LEAST_PART, CLEARLY, SMOOTHED_ROWS = 0.01, 5.0, 50.0  # of a current's part in the volts; in std
+DRIVING = ("duty", "voltage_V", "current_command_A", "current_A")
 AGAINST_NOISE = 0.3  # correlation below which a sign is not seen
 
 
@@ -29,14 +30,14 @@ def signs_of(by_target: Mapping[str, Choice], raw: Mapping[str, NDArray], rig: R
         speed = f"{side}_velocity_rad_per_s"
         if own is not None and speed in data:
             signs[speed], seen[speed] = _sign_of(np.gradient(own, time), data[speed], time)
-    command = next((n for n in ("duty", "voltage_V", "current_command_A") if n in data), None)
+    command = next((n for n in DRIVING if n in data), None)
     if command is not None and angle is not None:
         signs[command], seen[command] = _command_sign(data[command], angle, time)
         moving = ("motor_angle_rad",) if motor is not None else ("load_angle_rad",)
         for law in laws:  # laws of motion and winding see signs without being misled by inertia
             if law.columns[0] == command and law.columns[1] in moving:
                 signs[command], seen[command] = int(np.sign(law.ratio)) or 1, True
-        if "current_A" in data:
+        if "current_A" in data and command != "current_A":
             signs["current_A"], seen["current_A"] = _current_sign(
                 signs[command] * data[command], data["current_A"], angle, time
             )

@@ -17,7 +17,6 @@ from rsea_core.machine.rig import Rig, is_linear
 
 WINDING_TOLERANCE, GEAR_TOLERANCE, SPRING_TOLERANCE = 0.30, 0.12, 0.30
 DERIVATIVE_TOLERANCE, COUNT_TOLERANCE, NOISE_TOLERANCE = 0.08, 0.01, 0.45
-MOTION_TOLERANCE, HELD = 0.5, 4.0
 WORST = 30.0  # what one law can hold against a hypothesis, in log-likelihood units
 TOGETHER = 0.8
 FOLLOWS = 0.95  # correlation of a load that follows its motor
@@ -46,6 +45,8 @@ class Law:
         at all: without a relation between its columns there is nothing to compare.
     inverse : bool
         Whether the scale found falls as the last reading grows.
+    is_excess : bool
+        More than is needed, where friction that nobody stated may be what needs it.
     """
 
     text: str
@@ -54,6 +55,7 @@ class Law:
     columns: tuple[str, ...]
     held: float = 0.0
     inverse: bool = False
+    is_excess: bool = False
 
     @property
     def missing_scale(self) -> float:
@@ -103,17 +105,19 @@ def _rests_between(values: NDArray) -> bool:
     )
 
 
-def _slow(values: NDArray, window: int) -> NDArray:
+def slow_of(values: NDArray, window: int) -> NDArray:
+    """Means over so many rows, less the first value."""
     sums = np.cumsum(np.concatenate(([0.0], values - values[0])))
     return (sums[window:] - sums[:-window]) / window
 
 
 def _means(values: NDArray, rows: int) -> NDArray:
     """Means over the rows between two that are so far apart."""
-    return _slow(values, rows)[:-1] + values[0]
+    return slow_of(values, rows)[:-1] + values[0]
 
 
-def _window(time: NDArray) -> int:
+def window_of(time: NDArray) -> int:
+    """Rows in a tenth of a second: what slow parts are averaged over."""
     step = float(np.median(np.diff(time)))
     return int(np.clip(round(0.1 / step) if step > 0 else 1, 3, max(3, time.size // 20)))
 
@@ -125,7 +129,7 @@ def correlation_of(x: NDArray, y: NDArray) -> float:
     return float(np.sum(x * y)) / size if size > 0.0 else 0.0
 
 
-def _together(x: NDArray, y: NDArray) -> tuple[float, float]:
+def scale_of(x: NDArray, y: NDArray) -> tuple[float, float]:
     """Signed slope of y over x by their spreads, and the correlation."""
     if np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return 0.0, 0.0
@@ -139,12 +143,12 @@ def derivative_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> 
     for side in ("motor", "load"):
         angle, speed = f"{side}_angle_rad", f"{side}_velocity_rad_per_s"
         if angle in c and speed in c and "time_s" in c:
-            n = _window(c["time_s"]) // 2 + 2
+            n = window_of(c["time_s"]) // 2 + 2
             # the means of a speed over rows, against what the angle passes in them
             x = (c[angle][n:] - c[angle][:-n]) / np.maximum(
                 c["time_s"][n:] - c["time_s"][:-n], 1e-12
             )
-            slope, together = _together(x, _means(c[speed], n))
+            slope, together = scale_of(x, _means(c[speed], n))
             if abs(together) > TOGETHER:
                 text = f"{speed} is {slope:.3g} times the derivative of {angle}"
                 names = (angle, speed, "time_s")
@@ -158,8 +162,8 @@ def gear_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> list[L
     names = ("motor_angle_rad", "load_angle_rad")
     if not all(n in c for n in names):
         return []
-    n = _window(c["time_s"])
-    slope, together = _together(_slow(c[names[0]] / ratio, n), _slow(c[names[1]], n))
+    n = window_of(c["time_s"])
+    slope, together = scale_of(slow_of(c[names[0]] / ratio, n), slow_of(c[names[1]], n))
     if abs(together) < FOLLOWS:
         return []
     text = f"load_angle_rad is {slope:.3g} times motor_angle_rad over the gear ratio {ratio:g}"
@@ -173,8 +177,8 @@ def servo_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> list[
     if goal is None or name not in c or time is None:
         return []
     angle = c[name] / (1.0 if name == "load_angle_rad" else ratio)
-    n = 2 * _window(time)
-    slope, together = _together(_slow(goal, n), _slow(angle, n))
+    n = 2 * window_of(time)
+    slope, together = scale_of(slow_of(goal, n), slow_of(angle, n))
     if abs(together) < TOGETHER:
         return []
     text = f"{name} follows {POSITION_COMMAND} by {slope:.3g}"
@@ -188,7 +192,7 @@ def current_laws(rig: Rig | None, c: Mapping[str, NDArray], ratio: float) -> lis
     names = ("current_command_A", "current_A")
     if not all(n in c for n in names):
         return []
-    slope, together = _together(*(_slow(c[n], _window(c["time_s"]) // 4 + 1) for n in names))
+    slope, together = scale_of(*(slow_of(c[n], window_of(c["time_s"]) // 4 + 1) for n in names))
     if abs(together) < TOGETHER:
         return []
     text = f"current_A is {slope:.3g} times current_command_A"
@@ -212,7 +216,7 @@ def winding_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
     motion = next((n for n in motions if n in c), None)
     if volts is None or not (R and k_e and "current_A" in c and motion):
         return []
-    n = _window(c["time_s"])
+    n = window_of(c["time_s"])
     n = max(2, n // 4)
     moved = c[motion] * (ratio if motion.startswith("load") else 1.0)
     speed = _means(moved, n)
@@ -241,75 +245,6 @@ def winding_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
     return found
 
 
-def motion_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
-    """The torque of the command against what inertia, gravity, spring and back-EMF need of it.
-
-    Second differences over rows are accelerations in a triangular window: everything else is
-    averaged in the same one.
-    """
-    names = [n for n in ("motor_angle_rad", "load_angle_rad") if n in c]
-    given = _driving_torque(rig, c, ratio)
-    if not names or given is None:
-        return []
-    output = c[names[0]] / (ratio if names[0] == "motor_angle_rad" else 1.0)
-    inertia, static = _resisting(rig, c, output, ratio)
-    command, torque, damping = given
-    if inertia <= 0.0:
-        return []
-    n = max(2, _window(c["time_s"]) // 2)
-    span = n * max(float(np.median(np.diff(c["time_s"]))), 1e-12)
-    if output.size < 4 * n:
-        return []
-    acceleration = (output[2 * n :] - 2.0 * output[n:-n] + output[: -2 * n]) / span**2
-    speed = (output[2 * n :] - output[: -2 * n]) / (2.0 * span)
-    needed = inertia * acceleration + damping * speed + _twice(static, n)
-    slope, together = _together(needed, _twice(torque, n))
-    if abs(together) < TOGETHER:
-        return []
-    text = f"{command} gives {slope:.3g} times the torque that inertia, gravity and spring need"
-    return [Law(text=text, ratio=slope, tolerance=MOTION_TOLERANCE, columns=(command, names[0]),
-                held=HELD)]  # fmt: skip
-
-
-def _twice(values: NDArray, n: int) -> NDArray:
-    """Averages in a triangular window of n rows on both sides, at rows that have both."""
-    once = _slow(values, n)  # less the first value
-    return _slow(once, n)[1:-1] + once[0] + values[0]
-
-
-def _driving_torque(
-    rig: Rig, c: Mapping[str, NDArray], ratio: float
-) -> tuple[str, NDArray, float] | None:
-    """The command, its torque at the gear's output, and the damping there by the back-EMF."""
-    k_t, R, k_e = (rig.torque_constant_Nm_per_A, rig.terminal_resistance_ohm,
-                   rig.back_emf_constant_Vs_per_rad)  # fmt: skip
-    if not k_t:
-        return None
-    if "current_command_A" in c:
-        return "current_command_A", ratio * k_t * c["current_command_A"], 0.0
-    volts = volts_of(rig, c)
-    if volts is None or not R:
-        return None
-    return volts[0], ratio * k_t * volts[1] / R, ratio**2 * k_t * (k_e or k_t) / R
-
-
-def _resisting(
-    rig: Rig, c: Mapping[str, NDArray], output: NDArray, ratio: float
-) -> tuple[float, NDArray]:
-    """Inertia at the gear's output, and the torque of gravity or of the spring; (0, .): unknown."""
-    inertia = ratio**2 * (rig.motor_inertia_kgm2 or 0.0) + (rig.output_inertia_kgm2 or 0.0)
-    K, load = rig.spring_stiffness_Nm_per_rad, c.get("load_angle_rad")
-    if rig.has("spring"):
-        if not K or (load is None and rig.has("load")):
-            return 0.0, output
-        together = 0.0 if load is None else correlation_of(output, load)
-        if load is None or abs(together) < FOLLOWS:
-            return inertia, K * (output - (0.0 if load is None else np.sign(together) * load))
-    gravity = 9.81 * (rig.load_mass_kg or 0.0) * (rig.load_distance_m or 0.0)
-    turning = output if rig.axis == "rotary" else np.zeros_like(output)
-    return inertia + (rig.load_inertia_kgm2 or 0.0), gravity * np.sin(turning)
-
-
 def spring_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
     """The torque sensor against stiffness times deflection; without a load angle it is held."""
     K = rig.spring_stiffness_Nm_per_rad
@@ -324,8 +259,8 @@ def spring_laws(rig: Rig, c: Mapping[str, NDArray], ratio: float) -> list[Law]:
         deflection = c["motor_angle_rad"] / ratio
         if "load_angle_rad" in c:
             names, deflection = (*names, "load_angle_rad"), deflection - c["load_angle_rad"]
-    n = max(3, _window(c["time_s"]) // 4)
-    slope, together = _together(_slow(K * deflection, n), _slow(c["torque_Nm"], n))
+    n = max(3, window_of(c["time_s"]) // 4)
+    slope, together = scale_of(slow_of(K * deflection, n), slow_of(c["torque_Nm"], n))
     if abs(together) < TOGETHER:
         return []
     text = f"torque_Nm is {slope:.3g} times the spring's stiffness times its deflection"

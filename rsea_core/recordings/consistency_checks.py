@@ -35,6 +35,7 @@ from rsea_core.recordings.sample_faults import (
 
 TOGETHER = 0.8  # correlation from which two readings show the same motion
 FACTOR = 4.0  # no missing physics of these machines makes slow readings differ by so much
+WITH = 0.1  # of the work done there and back: clearly put in
 AGAINST = -0.3  # of the work done there and back: a drive that gains it back has a wrong sign
 BACK = 0.1  # of the range: as near as this to its start is back
 HELD = 0.01  # of what it should follow: a load that moves less than this is held
@@ -222,15 +223,27 @@ def _constant_angle(r: Recording, pair: ExpectedReading) -> Finding | None:
 
 def _gains_work(rig: Rig, r: Recording, window: int) -> Finding | None:
     """A command that takes work out of a motion there and back, where every loss takes it in."""
-    command = r.command_name
-    if command is None or command == "current_A" or r.load.kind == "imposed":
+    share = work_share(rig, r, window)
+    if share is None or share > AGAINST:
         return None
-    name = "motor_angle_rad"
-    if name not in r.responses:
-        name = "load_angle_rad"
-        if name not in r.responses or r.load.is_held:
-            return None
-    angle, drive = slow_part(r[name], window), slow_part(r[command], window)
+    name = _driven_angle(r)
+    text = (
+        f"{name} moves against {r.command_name}, as if the drive gained work there and back: one"
+        " of the two has the wrong sign"
+    )
+    return _of(r, name, Kind.AGAINST, text)
+
+
+def work_share(rig: Rig, r: Recording, window: int | None = None) -> float | None:
+    """The work that a command puts in there and back, of all that it does on the way.
+
+    None where nothing is driven, or nothing comes back.
+    """
+    name = _driven_angle(r)
+    if name is None:
+        return None
+    window = averaging_rows(rig, r) if window is None else window
+    angle, drive = slow_part(r[name], window), slow_part(r[r.command_name], window)
     span = float(np.ptp(angle))
     if span <= CLEAR * noise_floor(rig, r)[name]:
         return None
@@ -238,13 +251,17 @@ def _gains_work(rig: Rig, r: Recording, window: int) -> Finding | None:
     work = drive[:-1] * np.diff(angle)
     total = float(np.sum(np.abs(work)))
     there = float(np.sum(np.abs(work[:last])))
-    if not total > 0.0 or there < 0.5 * total or float(np.sum(work[:last])) > AGAINST * there:
+    return float(np.sum(work[:last])) / there if total > 0.0 and there >= 0.5 * total else None
+
+
+def _driven_angle(r: Recording) -> str | None:
+    """The angle that a command moves, where there is a sensor of it."""
+    if r.command_name is None or r.load.kind == "imposed" or r.quasi_static:
         return None
-    text = (
-        f"{name} moves against {command}, as if the drive gained work there and back: one of the"
-        " two has the wrong sign"
-    )
-    return _of(r, name, Kind.SIGN, text)
+    if "motor_angle_rad" in r.responses:
+        return "motor_angle_rad"
+    free = "load_angle_rad" in r.responses and not r.load.is_held
+    return "load_angle_rad" if free else None
 
 
 def _wrong_speed(rig: Rig, r: Recording, window: int) -> Finding | None:

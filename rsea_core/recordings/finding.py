@@ -26,6 +26,7 @@ class Kind(StrEnum):
     CONSTANT_RUN = "a reading that keeps one value while another moves"
     NOISE_STOPS = "a noisy reading that repeats one value"
     SIGN = "a reading of the other sign"
+    AGAINST = "a command that takes work out of the motion"
     UNIT = "a reading in another unit or on the other side of the gear"
     WRAP = "an angle that wraps at a full turn"
     JUMP = "a step that no inertia allows"

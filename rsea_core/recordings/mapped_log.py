@@ -26,6 +26,10 @@ OVERLAP = 0.5  # of the shorter stream: less in common are two clocks
 CLOCK = "time_s"
 
 
+class NoNumbersError(RecordingError):
+    """A column all of whose cells are empty."""
+
+
 def columns_of_log(
     paths: tuple[Path, ...],
     columns: ColumnMap,
@@ -74,7 +78,8 @@ def columns_of_log(
     keep &= (time >= first - 1e-9) & (time <= last + 1e-9)
     if keep.sum() < 3:
         raise RecordingError(f"{path}: {int(keep.sum())} rows are left between start_s and end_s")
-    references = _references(path, log, columns, time, keep)
+    references, empty = _references(path, log, columns, time, keep)
+    notes += empty
     if not keep.all():
         data = {name: values[keep] for name, values in data.items()}
     data[CLOCK] = data[CLOCK] - data[CLOCK][0]
@@ -258,7 +263,7 @@ def _named(path: Path, log: Streams, name: str, topic: str | None) -> tuple[NDAr
     empty = ~np.isfinite(values)
     share = float(empty.mean())
     if share >= 1.0:
-        raise RecordingError(f"{path}: column {name!r} holds no numbers")
+        raise NoNumbersError(f"{path}: column {name!r} holds no numbers")
     if share > SPARSE:  # a topic of its own rate in a common table
         return time[~empty], values[~empty]
     if share > 0.0:
@@ -317,13 +322,17 @@ def _brought(time: NDArray, own: NDArray, values: NDArray, hold: bool) -> NDArra
 
 
 def _references(path: Path, log: Streams, columns: ColumnMap, time: NDArray, keep: NDArray):
-    found = {}
+    found, empty = {}, []
     for given in columns.references:
         name = given.replace("{joint}", columns.joint or "{joint}")
         topic, apart, bare = name.rpartition(": ")
-        own, values = _named(path, log, bare if apart else name, topic if apart else None)
+        try:
+            own, values = _named(path, log, bare if apart else name, topic if apart else None)
+        except NoNumbersError:
+            empty.append(name)
+            continue
         found[name] = (values if own is time else _brought(time, own, values, True))[keep]
-    return found
+    return found, [f"column {n!r} holds no numbers: left out" for n in empty]
 
 
 def _evaluated(path: Path, log: Streams, source: ColumnSource) -> tuple[NDArray, NDArray]:

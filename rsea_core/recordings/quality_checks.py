@@ -4,12 +4,20 @@ Nothing moves, a reading is cut off or stuck, the time is too short or its clock
 torque was computed from the deflection instead of sensed, readings contradict each other.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rsea_core.machine.rig import Rig
 from rsea_core.recordings.case import Case, apparent_noise, noise_floor
-from rsea_core.recordings.consistency_checks import FACTOR, inconsistencies, zeros_and_jumps
+from rsea_core.recordings.consistency_checks import (
+    FACTOR,
+    WITH,
+    inconsistencies,
+    work_share,
+    zeros_and_jumps,
+)
 from rsea_core.recordings.finding import Finding, Kind
 from rsea_core.recordings.initial_speed import ANGLES, MOVES, MOVING, initial_motion
 from rsea_core.recordings.recording import Recording
@@ -51,6 +59,8 @@ def data_warnings(case: Case, *, pairs: bool = True) -> tuple[Finding, ...]:
     found = []
     for r in case.recordings:
         found += _of_one(case.rig, r, pairs)
+    if _is_pushed(case, found):
+        found = [_as_pushed(f) for f in found]
     return (*_rig_values(case.rig), *found, *_duplicates(case.recordings), *_no_command(case))
 
 
@@ -62,13 +72,34 @@ def data_errors(case: Case) -> tuple[Finding, ...]:
     if all(_is_silent(case.rig, r) for r in case.identification):
         text = f"nothing moves in {case.identification[0].file} nor in any other recording"
         found.append(Finding(kind=Kind.SILENT, text=text))
-    found += [f for r in case.recordings for f in _wrong(case.rig, r)]
+    wrong = [f for r in case.recordings for f in _wrong(case.rig, r)]
+    is_pushed = _is_pushed(case, wrong)
+    found += [f for f in wrong if not (is_pushed and f.kind is Kind.AGAINST)]
     found += _no_command(case, unless_moving=False)
     found += [f for f in clipped if f.column not in ANGLES]
     for r in case.recordings:
         found += _initial_motion(r, noise_floor(case.rig, r), CLEARLY)
     found += [f for r in case.recordings for f in zeros_and_jumps(case.rig, r)]
     return tuple(found)
+
+
+def _is_pushed(case: Case, found: list[Finding]) -> bool:
+    """Whether more recordings move with their command than those that move against it.
+
+    A wrong sign would be one of all of them: somebody pushes.
+    """
+    against = sum(f.kind is Kind.AGAINST for f in found)
+    if not against:
+        return False
+    shares = [work_share(case.rig, r) for r in case.recordings if r.rows >= FEW]
+    return sum(s is not None and s > WITH for s in shares) > against
+
+
+def _as_pushed(f: Finding) -> Finding:
+    if f.kind is not Kind.AGAINST:
+        return f
+    text = f"{f.text.split(',')[0]}, in other recordings with it: does something else push here"
+    return replace(f, text=text, is_question=True)
 
 
 def _rig_values(rig: Rig) -> list[Finding]:
