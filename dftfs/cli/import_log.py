@@ -25,6 +25,7 @@ from rsea_core.importing.case_maker import (
     listed_recordings,
     unread_text,
     windows_of,
+    with_rate,
 )
 from rsea_core.importing.case_text import recording_text
 from rsea_core.importing.log_columns import channels_of
@@ -72,6 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     if out.exists() and any(out.iterdir()) and not arguments.force:
         raise OutputError(f"{out} exists and is not empty; --force writes into it")
     rig, options = stated_rig(arguments.rig, options)
+    options = with_rate(groups, options)
     known = known_values(arguments.model, arguments.joint, arguments.spring)
     rig = completed(rig, known)
     columns = labelled_columns(groups[0], options)

@@ -15,6 +15,7 @@ from rsea_core.importing.case_text import ListedRecording, columns_text, parts_o
 from rsea_core.importing.proposal import Proposal, answered, propose, why_no_time
 from rsea_core.importing.rest import HELD_SPAN, usual_load, with_rest_as_zero
 from rsea_core.importing.stated_map import stated_answers, with_overrides
+from rsea_core.importing.streams.common_clock import clock_name, clock_notes
 from rsea_core.importing.streams.wraps import without_wraps, wraps_of
 from rsea_core.machine.inputs import POSITION_COMMAND
 from rsea_core.machine.rig import Rig, is_linear
@@ -88,6 +89,38 @@ def _groups_of(logs: Sequence[Log]) -> list[list[Log]]:
     """Logs with the same columns are recordings; others are files of one recording."""
     names = [sorted(n for s in log.streams for n in s.columns) for log in logs]
     return [[log] for log in logs] if all(n == names[0] for n in names) else [list(logs)]
+
+
+def with_rate(groups: Sequence[Sequence[Log]], options: ImportOptions) -> ImportOptions:
+    """The options with the rate that the files hold as a number, where they have no times.
+
+    Raises
+    ------
+    RecordingError
+        If the files hold different rates.
+    """
+    logs = [log for group in groups for log in group]
+    rates = {log.rate[1] for log in logs if log.rate is not None}
+    has_time = any(clock_name(s) for log in logs for s in log.streams)
+    has_time |= any(text.startswith("time_s") for text in options.answers)
+    has_time |= "time_s" in (options.columns or {})
+    if options.rate_Hz is not None:
+        longest = max(logs[0].streams, key=lambda s: s.rows)
+        notes = clock_notes(longest, options.rate_Hz)
+        notes += tuple(
+            f"{log.path.name}: {log.rate[0]} is {log.rate[1]:g} rows per second, not"
+            f" {options.rate_Hz:g}"
+            for log in logs if log.rate is not None and log.rate[1] != options.rate_Hz
+        )  # fmt: skip
+        return replace(options, notes=(*options.notes, *notes))
+    if has_time or not rates:
+        return options
+    if len(rates) > 1:
+        listed = ", ".join(f"{log.path.name} {log.rate[1]:g} Hz" for log in logs if log.rate)
+        raise RecordingError(f"different rates: {listed}; import them into cases of their own")
+    name, rate = next(log.rate for log in logs if log.rate is not None)
+    note = f"no column is a time: {name} of the file gives {rate:g} rows per second"
+    return replace(options, rate_Hz=rate, notes=(*options.notes, note))
 
 
 def labelled_columns(group: Sequence[Log], options: ImportOptions) -> dict[str, lc.Column]:

@@ -116,6 +116,8 @@ def choices_of(name: str, target: str, evidence: NameEvidence, raw: NDArray, rig
             prior = 0.5 if whole and np.ptp(raw) > 20.0 else -12.0
         elif quantity == "angle" and whole and np.ptp(raw) > 100.0:
             prior -= 3.0
+        elif quantity == "velocity" and (whole or evidence.is_rate_of_turns):
+            prior = 0.5 if unit == "rpm" else prior - 0.5
         found += _sided(name, target, unit, prior, rig, raw)
     return [c for c in found if c.prior > IMPOSSIBLE] or found
 

@@ -23,7 +23,6 @@ from rsea_core.machine.rig import Rig
 from rsea_core.terms.known import KnownTerm
 
 MOTION_TOLERANCE, HELD = 0.5, 4.0
-EXCESS_TOLERANCE = 1.36  # a command of 30 times the torque is as odd as one of a third of it
 GRAVITY_m_per_s2 = 9.81
 CREEPING = 1e-3  # of the largest speed: friction has no direction below it
 PARTS = {"gear-friction": "motor", "load-friction": "load", "spring-parallel": "load"}
@@ -63,7 +62,7 @@ def motion_laws(
         Law(
             text=f"{command} gives {slope:.3g} times the torque that {what} need",
             ratio=slope,
-            tolerance=EXCESS_TOLERANCE if is_excess else MOTION_TOLERANCE,
+            tolerance=MOTION_TOLERANCE,
             columns=(command, names[0]),
             held=HELD,
             is_excess=is_excess,

@@ -18,6 +18,7 @@ from rsea_core.machine.rig import Rig, is_linear
 WINDING_TOLERANCE, GEAR_TOLERANCE, SPRING_TOLERANCE = 0.30, 0.12, 0.30
 DERIVATIVE_TOLERANCE, COUNT_TOLERANCE, NOISE_TOLERANCE = 0.08, 0.01, 0.45
 WORST = 30.0  # what one law can hold against a hypothesis, in log-likelihood units
+WORST_EXCESS = 14.0  # less than a stated unit is worth: friction that nobody stated may explain it
 TOGETHER = 0.8
 FOLLOWS = 0.95  # correlation of a load that follows its motor
 FEW = 50
@@ -73,7 +74,8 @@ class Law:
         size = abs(self.ratio)
         if not size > 0.0 or not np.isfinite(size):
             return -WORST
-        return self.held - min(0.5 * (np.log(size) / self.tolerance) ** 2, WORST)
+        worst = WORST_EXCESS if self.is_excess else WORST
+        return self.held - min(0.5 * (np.log(size) / self.tolerance) ** 2, worst)
 
 
 def step_of(values: NDArray) -> float | None:

@@ -178,6 +178,11 @@ class Rig:
                 f"torque_constant ({k_t:g} Nm/A) and back_emf_constant ({k_e:g} Vs/rad) differ"
                 f" by {abs(k_t - k_e) / min(k_t, k_e):.1%}: {MISMATCH_HINT}{creates}"
             )
+        found += [
+            f"[tolerances] {key} = {share:g} is a standard deviation of {share:.0%}:"
+            f" {share:g} % is {share / 100:g}"
+            for key, share in self.tolerances if share > 1.0
+        ]  # fmt: skip
         for key, info in QUANTITIES.items():
             unused = info["part"] in PARTS and info["part"] not in self.parts
             if unused and getattr(self, key) is not None:

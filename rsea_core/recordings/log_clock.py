@@ -17,6 +17,7 @@ UNCLEAR = 0.1  # of a turn, around half of one
 RESTART = 0.05  # of the span: how close to its first value a new run begins
 EVEN = 0.05  # steps within this share of their mean are one grid, printed with few digits
 DROPPED = 1.5  # of an otherwise even grid: a longer step has lost a row
+FEW_TICKS = 3  # that repeat: the clock is coarser than the rows
 MOST_LOST = 2  # rows in a row that are filled there; more are a gap
 GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
 
@@ -53,6 +54,19 @@ def longest_step(steps: NDArray) -> float:
     if _is_even(steps):
         return (MOST_LOST + DROPPED) * float(np.median(steps))
     return GAP * float(np.percentile(steps, 99.0))
+
+
+def tick_hint(time: NDArray) -> str:
+    """What to do about a clock whose ticks are too coarse for its rows; "" where it is another."""
+    steps = np.diff(time)
+    if np.any(steps < 0.0) or np.sum(steps == 0.0) < FEW_TICKS:
+        return ""
+    k = max(1, min(1000, time.size // 4))
+    row_s = float(np.median(time[k:] - time[:-k])) / k
+    if not row_s > 0.0:
+        return ""
+    rate = f"{1.0 / row_s:.4g}"
+    return f"; its ticks show {rate} rows per second: state --rate-hz {rate} (rate_Hz in [columns])"
 
 
 def lost_rows(steps: NDArray) -> NDArray:

@@ -26,7 +26,7 @@ from rsea_core.numeric.brief_repr import BriefRepr
 from rsea_core.recordings.bench_log import is_bench_log, read_bench_log
 from rsea_core.recordings.column_map import ColumnMap
 from rsea_core.recordings.finding import Finding, Kind
-from rsea_core.recordings.log_clock import EVEN, longest_step, lost_rows, places_of_rows
+from rsea_core.recordings.log_clock import EVEN, longest_step, lost_rows, places_of_rows, tick_hint
 from rsea_core.recordings.mapped_log import columns_of_log, identity_map
 
 RESPONSES = (
@@ -317,9 +317,8 @@ def check_values(path: Path, columns: Mapping[str, NDArray]) -> None:
     if not np.all(steps > 0.0):
         k = int(np.argmax(steps <= 0.0)) + 1
         what = "repeats" if steps[k - 1] == 0.0 else "goes back from"
-        raise RecordingError(
-            f"{path}: column time_s, row {k + 2}: {time[k]:.15g} {what} {time[k - 1]:.15g}"
-        )
+        pair = f"{time[k]:.15g} {what} {time[k - 1]:.15g}{tick_hint(time)}"
+        raise RecordingError(f"{path}: column time_s, row {k + 2}: {pair}")
     for name, values in columns.items():
         if name != "time_s":
             _require(path, name, np.abs(values) <= LARGEST, columns, f"is beyond {LARGEST:g}")

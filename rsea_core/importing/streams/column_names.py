@@ -49,6 +49,7 @@ UNITS = {
 }  # fmt: skip
 LAST_UNITS = {"A": "A", "V": "V", "C": "degC", "mA": "mA", "mNm": "mN*m", "Nm": "N*m"}
 """Units as the last part of a name only, in their own case."""
+TURNS_PER_MINUTE = ("n", "nmot", "drehzahl", "tacho", "tours", "giri")
 LEROBOT = ("action", "observation.state")  # of its data sets: goals and angles of the joints
 LAST_TIME = ("time", "timestamp", "stamp", "times")
 LINEAR_UNITS = {
@@ -78,12 +79,15 @@ class NameEvidence:
     side : "motor", "load" or None
     unit : str or None
     is_goal : bool
+    is_rate_of_turns : bool
+        Of a speed: one of the words for turns per minute.
     """
 
     quantity: str | None
     side: str | None
     unit: str | None
     is_goal: bool
+    is_rate_of_turns: bool = False
 
 
 def name_evidence(
@@ -130,6 +134,7 @@ def name_evidence(
         side=side,
         unit=unit,
         is_goal=any(w in _GOAL for w in parts),
+        is_rate_of_turns=any(w in TURNS_PER_MINUTE for w in parts),
     )
 
 

@@ -1,9 +1,11 @@
 """The clock that the streams of a log have in common, and streams that have none."""
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rsea_core.errors import RecordingError
 from rsea_core.importing.streams.column_names import name_evidence
@@ -11,6 +13,9 @@ from rsea_core.recordings.mapped_log import OVERLAP
 from rsea_core.recordings.readers.log import LOG_TIME, Stream
 from rsea_core.recordings.readers.messages import STAMP
 
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+FEWEST_ROWS, MOST_LOST = 50, 0.2  # of the rows: a counter that lacks more counts something else
+SAME_RATE = 1e-3  # relative
 OTHER_UNIT = 50.0  # times as long and as coarse: a clock in another unit
 
 
@@ -21,6 +26,43 @@ def clock_name(stream: Stream, others: Sequence[Stream] = ()) -> str | None:
     known = [n for n in (STAMP, *own, LOG_TIME) if n in stream.columns]
     common = [n for n in known if all(n in s.columns for s in others if has_readings(s))]
     return next(iter([*common, *known]), None)
+
+
+def clock_notes(stream: Stream, rate_Hz: float) -> tuple[str, ...]:
+    """Columns of a stream that show other times than the rate that is stated for its rows."""
+    return tuple(
+        text
+        for name, values in stream.columns.items()
+        if values.size > FEWEST_ROWS and np.all(np.diff(values) >= 0.0)
+        for text in [_other_time(name, stream.units.get(name), values, rate_Hz)]
+        if text is not None
+    )
+
+
+def _other_time(name: str, unit: str | None, values: NDArray, rate_Hz: float) -> str | None:
+    rows, passed = values.size, float(values[-1] - values[0])
+    evidence = name_evidence(name, unit)
+    if evidence.quantity != "time":
+        lost = passed - (rows - 1)
+        steps = np.diff(values)
+        counts = np.median(steps) == 1.0 and np.all(steps == np.round(steps))
+        if not counts or not 1.0 <= lost <= MOST_LOST * rows:
+            return None
+        entry = f'{{ name = "{name}", scale = {1.0 / rate_Hz:.9g} }}'
+        return (
+            f"column {name!r} counts {lost:.0f} rows that the log lacks, which --rate-hz closes"
+            f" up; it is the clock by --column {shlex.quote(f'time_s={entry}')}"
+        )
+    units = [evidence.unit] if evidence.unit in SECONDS else list(SECONDS)
+    shares = {u: SECONDS[u] * passed * rate_Hz / (rows - 1) for u in units}
+    own = min(shares, key=lambda u: abs(np.log(max(shares[u], 1e-12))))
+    if abs(shares[own] - 1.0) * (rows - 1) < 1.5 or abs(shares[own] - 1.0) < SAME_RATE:
+        return None
+    return (
+        f"column {name!r} passes {SECONDS[own] * passed:.6g} s, {rows} rows at --rate-hz"
+        f" {rate_Hz:g} take {(rows - 1) / rate_Hz:.6g} s: rows were lost, or the rate is another;"
+        f" it is the clock by --column {shlex.quote(f'time_s={name}:{own}')}"
+    )
 
 
 def telling_name(name: str, topic: str | None) -> str:

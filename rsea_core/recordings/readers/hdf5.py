@@ -13,6 +13,7 @@ from rsea_core.recordings.readers.log import (
     flat_columns,
     headings_of,
     library,
+    rate_of,
     streams_by_length,
 )
 
@@ -52,6 +53,7 @@ def read_hdf5(path: Path, format_name: str = "HDF5", *, turned: bool = False) ->
     found = _Content(h5py, turned)
     try:
         with h5py.File(path, "r") as file:
+            found.numbers |= dict(file.attrs)
             file.visititems(found.visit)
     except (OSError, ValueError, RuntimeError, KeyError) as problem:
         raise damaged(path, "HDF5", problem) from problem
@@ -61,7 +63,7 @@ def read_hdf5(path: Path, format_name: str = "HDF5", *, turned: bool = False) ->
         raise RecordingError(f"{path}: {', '.join(found.objects[:3])}: {ONLY_MATLAB}")
     if not streams:
         raise RecordingError(f"{path}: has no dataset of three rows or more")
-    return Log(path=path, format=format_name, streams=streams)
+    return Log(path=path, format=format_name, streams=streams, rate=rate_of(found.numbers))
 
 
 class _Content:
@@ -71,6 +73,7 @@ class _Content:
         self.h5py, self.turned = h5py, turned
         self.arrays: dict[str, NDArray] = {}
         self.units: dict[str, str] = {}
+        self.numbers: dict[str, object] = {}  # single ones
         self.texts: list[object] = []
         self.objects: list[str] = []  # of MATLAB, which it alone reads
         self.left = MOST_ELEMENTS
@@ -111,6 +114,8 @@ class _Content:
             self.arrays.update({f"{name}/{own}": table[own] for own in item.dtype.names})
         if item.dtype.kind in "SO" and item.ndim == 1 and self.h5py.check_string_dtype(item.dtype):
             self.texts.append(item[()])
+        if item.dtype.kind in "fiu" and item.size == 1:
+            self.numbers[name] = item[()]
         if item.dtype.kind not in "fiub" or item.ndim not in (1, 2) or item.size < 3:
             return
         if item.nbytes > LARGEST_BYTES:

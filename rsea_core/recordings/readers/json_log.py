@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from rsea_core.errors import RecordingError
-from rsea_core.recordings.readers.log import Log, Stream, damaged, flat_columns
+from rsea_core.recordings.readers.log import Log, Stream, damaged, flat_columns, rate_of
 from rsea_core.recordings.readers.messages import numbers_of
 
 KIND = "JSON"
@@ -30,18 +30,19 @@ def read_json(path: Path) -> Log:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as problem:
         raise damaged(path, KIND, problem) from problem
-    whole = _loaded(text)
+    whole, rate = _loaded(text), None
     if isinstance(whole, dict) and not any(isinstance(v, list) for v in whole.values()):
         whole = None  # a single line
     if isinstance(whole, dict):
         columns = flat_columns({k: v for k, v in whole.items() if _is_table(v)})
+        rate = rate_of(whole)
         rows = max((v.size for v in columns.values()), default=0)
         columns = {k: v for k, v in columns.items() if v.size == rows}
     else:
         columns = _columns(_lines(path, text) if whole is None else whole)
     if len(next(iter(columns.values()), ())) < 3:
         raise RecordingError(f"{path}: is {KIND} without rows of numbers")
-    return Log(path=path, format=KIND, streams=(Stream(columns=columns),))
+    return Log(path=path, format=KIND, streams=(Stream(columns=columns),), rate=rate)
 
 
 def _loaded(text: str) -> object:

@@ -17,6 +17,11 @@ from numpy.typing import NDArray
 from rsea_core.errors import RecordingError
 
 LOG_TIME = "log_time"  # seconds since the first message of a log of messages
+RATES = ("fs", "f_s", "rate", "rate_hz", "ratehz", "sample_rate", "samplerate", "sampling_rate",
+         "sample_rate_hz", "fs_hz", "sampling_frequency", "sample_frequency")  # fmt: skip
+STEPS = ("dt", "ts", "dt_s", "ts_s", "sample_time", "sample_time_s", "sampling_time",
+         "sample_period", "period_s")  # fmt: skip
+SLOWEST_Hz, FASTEST_Hz = 1.0, 1e6  # of loggers of machines
 WIDEST = 64  # elements of an array in one row; more is a picture or a map, not readings
 
 
@@ -57,11 +62,14 @@ class Log:
     format : str
         What it is, for people.
     streams : tuple of Stream
+    rate : (str, float) or None
+        Name and rows per second of a single number beside the arrays that is their rate.
     """
 
     path: Path
     format: str
     streams: tuple[Stream, ...]
+    rate: tuple[str, float] | None = None
 
 
 def library(name: str, path: Path) -> ModuleType:
@@ -93,6 +101,34 @@ def headings_of(texts: Iterable[object]) -> tuple[tuple[str, ...], ...]:
     ]
     kept = [tuple(t.strip() for t in row) for row in rows if all(isinstance(t, str) for t in row)]
     return tuple(row for row in dict.fromkeys(kept) if len(set(row)) == len(row) and all(row))
+
+
+def rate_of(numbers: Mapping[str, object]) -> tuple[str, float] | None:
+    """The name of a rate, and the rows per second; None where no number is one, or they differ.
+
+    Parameters
+    ----------
+    numbers : mapping of name to anything
+        What a file holds by name; arrays of more than one element are none.
+    """
+    found = {}
+    for name, value in numbers.items():
+        own = re.split(r"[./]", name)[-1].lower()
+        if own not in RATES and own not in STEPS:
+            continue
+        try:
+            values = np.asarray(value, dtype=float).ravel()
+        except (TypeError, ValueError):
+            continue
+        if values.size != 1 or not values[0] > 0.0:
+            continue
+        rate = float(values[0] if own in RATES else 1.0 / values[0])
+        if SLOWEST_Hz <= rate <= FASTEST_Hz:
+            found[name] = rate
+    rates = list(found.values())
+    if not rates or max(rates) > 1.001 * min(rates):
+        return None
+    return next(iter(found.items()))
 
 
 def flat_columns(

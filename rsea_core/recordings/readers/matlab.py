@@ -11,6 +11,7 @@ from rsea_core.recordings.readers.log import (
     damaged,
     flat_columns,
     headings_of,
+    rate_of,
     streams_by_length,
 )
 
@@ -48,7 +49,7 @@ def read_matlab(path: Path) -> Log:
         if opaque:
             raise RecordingError(f"{path}: {', '.join(opaque[:3])}: {ONLY_MATLAB}")
         raise RecordingError(f"{path}: has no array of three rows or more")
-    return Log(path=path, format="MATLAB", streams=streams)
+    return Log(path=path, format="MATLAB", streams=streams, rate=rate_of(arrays))
 
 
 def _collect(name: str, value: object, arrays: dict, depth: int) -> None:
@@ -58,6 +59,8 @@ def _collect(name: str, value: object, arrays: dict, depth: int) -> None:
             _collect(f"{name}.{own}", getattr(value, own), arrays, depth + 1)
     elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
         arrays[name] = value
+    elif isinstance(value, int | float):
+        arrays[name] = np.asarray(value)
     elif isinstance(value, np.ndarray) and value.dtype == object and value.ndim == 1 and depth < 6:
         for k, own in enumerate(value):  # signals of Simulink (label), channels of dSPACE (Name)
             label = next((getattr(own, key) for key in LABELS if _is_text(own, key)), str(k + 1))

@@ -11,6 +11,7 @@ from rsea_core.recordings.readers.log import (
     damaged,
     flat_columns,
     headings_of,
+    rate_of,
     streams_by_length,
 )
 
@@ -46,7 +47,7 @@ def read_npz(path: Path) -> Log:
     streams = streams_by_length(flat_columns(arrays, headings=headings_of(texts)), {})
     if not streams:
         raise RecordingError(f"{path}: has no array of three rows or more")
-    return Log(path=path, format="NumPy", streams=streams)
+    return Log(path=path, format="NumPy", streams=streams, rate=rate_of(arrays))
 
 
 def _fields(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
