@@ -94,7 +94,11 @@ EXAMPLES = {
     "deliver": ("dftfs deliver al1",),
     "article": ("dftfs article al1 measuring-sheet.csv",),
     "mount": ("dftfs mount al1 --rim-bolts 8 3.2 165.5 --preload-N 3000",),
-    "import": ("dftfs import log.csv --rig rig.toml --out my-case",),
+    "import": (
+        "dftfs import log.csv --rig rig.toml --out my-case",
+        "dftfs import log.csv --rig rig.toml --out my-case --column"
+        """ 'current_A={ name = "TRQ", unit = "A", scale = 0.08 }'""",
+    ),
     "doctor": ("dftfs doctor", "dftfs doctor CASE --out out/health"),
     "export-log": ("dftfs export-log CASE --out out/logs --format mcap",),
     "thesis": ("dftfs thesis",),

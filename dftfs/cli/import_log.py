@@ -48,7 +48,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--part", action="append", default=[], metavar="START:END[:ROLE]",
         help="seconds of the log that are one recording (repeatable)")  # fmt: skip
     add("--column", action="append", default=[], metavar="NAME=COLUMN:UNIT[:SIGN]",
-        help="set without asking: motor_angle_rad=enc1:deg:-1, or as in [columns]")  # fmt: skip
+        help="set without asking: motor_angle_rad=enc1:deg:-1, or a table as in [columns]:"
+        """ 'current_A={ name = "TRQ", unit = "A", scale = 0.08, zero = 50, sign = -1 }' (wrap of"""
+        " an angle that starts again); reference=COLUMN keeps one, ignore=COLUMN leaves it out",
+        )  # fmt: skip
     add("--yes", action="store_true", help="accept every proposal without asking")
     add("--force", action="store_true", help="write into a folder that is not empty")
     add("--json", action="store_true", help="print the proposal as JSON")

@@ -213,3 +213,51 @@ def test_columns_of_text_are_named_and_a_broken_clock_says_where(bench, capsys):
     (bench / "log.csv").write_text("\n".join(swapped))
     assert imported(bench, "--force") == 2
     assert "column 'Time' goes back in row" in capsys.readouterr().err
+
+
+def test_a_map_of_the_rig_file_is_used_unless_it_was_only_proposed(bench, capsys):
+    rig = (bench / "rig.toml").read_text()
+    own = 'current_A = { name = "loadcell" }\nreference = ["theta_l"]\nignore = ["*"]\n'
+    (bench / "rig.toml").write_text(f"{rig}\n[columns]\n{own}")
+    assert imported(bench, "--yes", "--column", "ignore=goal_deg") == 0
+    r = read_case(bench / "case").recordings[0]
+    assert np.allclose(r["current_A"], recorded()["torque_Nm"])
+    assert "theta_l" in r.references
+    assert "goal_deg" not in r.references
+    (bench / "rig.toml").write_text(f"{rig}\n[columns]\nproposed = true\n{own}")
+    assert imported(bench, "--force") == 0
+    assert "was proposed without values of the machine" in capsys.readouterr().out
+    assert "torque_Nm" in read_case(bench / "case").recordings[0]
+
+
+def test_a_gap_is_split_where_it_is_refused_and_a_scaled_counter_is_a_clock(bench, capsys):
+    head, *rows = (bench / "log.csv").read_text().splitlines()
+    kept = rows[:1000] + rows[1001:2000] + rows[2004:]
+    text = [f"seq,{head.partition(',')[2]}"]
+    text += [f"{k + 7},{row.partition(',')[2]}" for k, row in enumerate(rows) if row in kept]
+    (bench / "log.csv").write_text("\n".join(text))
+    clock = ("--column", 'time_s={ name = "seq", scale = 0.001 }')
+    assert imported(bench, *clock) == 2
+    assert "split the recording there (dftfs import --split)" in capsys.readouterr().err
+    assert imported(bench, *clock, "--split") == 0
+    assert [r.rows for r in read_case(bench / "case").recordings] == [2000, 1996]
+    assert "1 of 2000 rows were lost" in capsys.readouterr().out
+
+
+def test_the_preview_shows_a_recording_that_is_added(bench):
+    imported(bench)
+    (bench / "second.csv").write_text((bench / "log.csv").read_text())
+    assert main(["import", str(bench / "second.csv"), "--out", str(bench / "case")]) == 0
+    assert "second.csv" in (bench / "case" / "preview.html").read_text(encoding="utf-8")
+
+
+def test_a_rate_that_the_file_holds_is_the_clock(bench, capsys):
+    table = np.genfromtxt(bench / "log.csv", delimiter=",", names=True)
+    columns = {n: table[n] for n in table.dtype.names if n != "Time"}
+    np.savez(bench / "log.npz", **columns, fs=1000.0)
+    own = ["import", str(bench / "log.npz"), "--out", str(bench / "case")]
+    assert main([*own, "--rig", str(bench / "rig.toml")]) == 0
+    assert read_case(bench / "case").recordings[0].sample_time_s == pytest.approx(1e-3)
+    out = capsys.readouterr().out
+    assert "fs of the file gives 1000 rows per second" in out
+    assert out.count("missing in [rig]") <= 1

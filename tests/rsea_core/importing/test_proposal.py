@@ -176,3 +176,36 @@ def test_the_written_table_names_reason_and_confidence_of_every_column():
     text = columns_text(entries, references=[], rate_Hz=None)
     assert 'motor_angle_rad = { name = "theta_m", unit = "deg" }' in text
     assert text.count("# 100%") == len(found.columns)
+
+
+@pytest.mark.parametrize("moves", [np.full(3000, 305.0), 305.0 + np.arange(3000) % 3])
+def test_no_step_can_be_read_off_one_speed(moves):
+    assert step_of(np.cumsum(moves)) is None
+
+
+def test_rows_that_were_filled_between_two_halve_no_step():
+    counts = np.cumsum(np.random.default_rng(4).integers(-4, 5, 5000)).astype(float)
+    rows = np.arange(100, 4900, 230)
+    counts[rows] = 0.5 * (counts[rows - 1] + counts[rows + 1])
+    assert step_of(0.1 * counts) == pytest.approx(0.1)
+
+
+def test_a_torque_that_nothing_but_its_name_shows_is_asked():
+    rig, data = carriage(enc=4000.0 / (2.0 * np.pi))
+    kept = {"time": data["time"], "enc": np.round(data["enc"]), "TRQ": 40.0 * data["I"]}
+    questions = propose(kept, {}, rig).questions
+    assert any("column 'TRQ': torque_Nm" in q for q in questions)
+
+
+def test_the_sign_of_a_current_that_alone_drives_is_seen_in_the_motion():
+    rig, data = carriage(enc=4000.0 / (2.0 * np.pi), I=-1.0)
+    kept = {"time": data["time"], "enc": np.round(data["enc"]), "I": data["I"]}
+    found = propose(kept, {}, rig)
+    signs = {c.target: c.sign for c in found.columns}
+    assert signs["current_A"] * signs["motor_angle_rad"] == -1
+
+
+def test_turns_per_minute_are_offered_for_a_speed_that_is_named_or_counted_so():
+    rig, data = carriage()
+    data = {"time": data["time"], "N": np.round(900.0 * np.sin(data["time"])), "I": data["I"]}
+    assert any("in rpm" in q for q in propose(data, {}, rig).questions)

@@ -140,3 +140,8 @@ def test_missing_file_and_preset_are_named(tmp_path):
         RigError, match="no rig preset 'rsea'; the nearest known one is 'rsea-bench'"
     ):
         Rig.preset("rsea")
+
+
+def test_a_tolerance_above_1_is_a_finding():
+    rig = replace(Rig.preset("rsea-bench"), tolerances=(("load_inertia_kgm2", 6.0),))
+    assert any("standard deviation of 600%: 6 % is 0.06" in text for text in rig.findings())

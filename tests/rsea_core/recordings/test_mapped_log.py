@@ -111,3 +111,12 @@ def test_a_wrong_map_is_one_line_that_names_what_is_allowed(old, new, message, t
 )  # fmt: skip
 def test_units_as_loggers_write_them(value, unit, target, si):
     assert to_si(np.array([value]), unit, target)[0] == pytest.approx(si, rel=1e-8)
+
+
+def test_a_reference_without_numbers_is_left_out_with_a_note(tmp_path):
+    lines = write_csv(tmp_path / "log.csv").read_text().splitlines()
+    rows = [lines[0] + ",goal", *(f"{line},nan" for line in lines[1:])]
+    (tmp_path / "log.csv").write_text("\n".join(rows))
+    r = read(tmp_path, "log.csv", reference='"goal"')
+    assert not r.references
+    assert any("'goal' holds no numbers: left out" in note.text for note in r.notes)

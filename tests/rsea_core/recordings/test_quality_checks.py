@@ -162,3 +162,31 @@ def test_values_of_a_rig_file_that_cannot_be_true_together_are_reported(values, 
     assert message in found.text
     bench = replace(case, rig=Rig.preset("rsea-bench"))
     assert data_warnings(bench) == ()
+
+
+def driven(file: str, sign: float, column: str) -> Recording:
+    """A motor that turns there and back against friction, or is turned against its command."""
+    t = 0.001 * np.arange(4000)
+    angle = 3.0 * (1.0 - np.cos(2.0 * np.pi * 0.5 * t))
+    columns = {"time_s": t, column: sign * np.sin(2.0 * np.pi * 0.5 * t), "motor_angle_rad": angle}
+    return Recording(file=file, columns=columns, sample_time_s=0.001, load=Load(kind="free"))
+
+
+def case_of(*signs: float, column: str = "current_A") -> Case:
+    recordings = tuple(driven(f"{k}.csv", s, column) for k, s in enumerate(signs))
+    rig = replace(RIG, parts=("drive", "gear", "load"), supply_voltage_V=None)
+    return Case(name="c", folder=Path(), rig=rig, recordings=recordings)
+
+
+def test_a_current_against_its_motion_has_the_wrong_sign():
+    for column in ("current_A", "current_command_A"):
+        found = sentences(data_warnings(case_of(-1.0, column=column)))
+        assert any(f"moves against {column}" in text and "wrong sign" in text for text in found)
+
+
+def test_one_recording_that_disagrees_with_the_others_is_no_wrong_sign():
+    case = case_of(1.0, 1.0, -1.0)
+    found = sentences(data_warnings(case))
+    assert not any("wrong sign" in text for text in found)
+    assert any("does something else push here?" in text for text in found)
+    assert not any("moves against" in text for text in sentences(data_errors(case)))
