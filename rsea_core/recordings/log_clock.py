@@ -17,6 +17,7 @@ UNCLEAR = 0.1  # of a turn, around half of one
 RESTART = 0.05  # of the span: how close to its first value a new run begins
 EVEN = 0.05  # steps within this share of their mean are one grid, printed with few digits
 DROPPED = 1.5  # of an otherwise even grid: a longer step has lost a row
+TICK_ROWS = 50  # over which ticks are counted
 FEW_TICKS = 3  # that repeat: the clock is coarser than the rows
 MOST_LOST = 2  # rows in a row that are filled there; more are a gap
 GAP = 10.0  # of a jittery one: times the 99th percentile of its steps
@@ -61,9 +62,10 @@ def tick_hint(time: NDArray) -> str:
     steps = np.diff(time)
     if np.any(steps < 0.0) or np.sum(steps == 0.0) < FEW_TICKS:
         return ""
-    k = max(1, min(1000, time.size // 4))
-    passed = np.sort(time[k:] - time[:-k])  # the middle half: rows may be late, or lost
-    row_s = float(np.mean(passed[passed.size // 4 : -(passed.size // 4) or None])) / k
+    k = max(1, min(TICK_ROWS, time.size // 4))
+    passed = time[k:] - time[:-k]
+    off = np.abs(passed - np.median(passed))  # large where rows are late, or lost
+    row_s = float(np.mean(passed[off < 1.5 * steps[steps > 0.0].min()])) / k if steps.any() else 0.0
     if not row_s > 0.0:
         return ""
     rate = f"{1.0 / row_s:.4g}"
