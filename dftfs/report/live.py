@@ -182,10 +182,9 @@ def _shade(where: dict) -> dict:
 
 
 def _packed(values: NDArray) -> dict:
-    return {
-        "dtype": "f4",
-        "bdata": base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii"),
-    }
+    most = np.finfo(np.float32).max  # a diverging simulation is drawn up to here
+    packed = np.clip(np.asarray(values, dtype=float), -most, most).astype("<f4")
+    return {"dtype": "f4", "bdata": base64.b64encode(packed.tobytes()).decode("ascii")}
 
 
 def library(figures: Sequence[ReportFigure]) -> str:
