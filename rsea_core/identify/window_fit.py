@@ -36,6 +36,7 @@ from rsea_core.identify.multistep.steps import normal_equations
 from rsea_core.machine.inputs import POSITION_COMMAND
 
 DAMPING, INDUCTANCE = "viscous_Nms_per_rad", "terminal_inductance_H"
+NO_SHARE = 1e-4  # of the usual torque: a smaller unknown one explains no error
 RESISTANCE = "terminal_resistance_ohm"
 
 
@@ -168,7 +169,7 @@ def unknown_torque(estimator: Estimator, error: float) -> str | None:
     the spread of the readings: where nothing pulls a machine back, a small torque moves it far.
     """
     share, size, time_s = _largest_unknown_torque(estimator)
-    if size == 0.0 or (share < UNKNOWN_SHARE and error < DOUBTED_ERROR):
+    if share < NO_SHARE or (share < UNKNOWN_SHARE and error < DOUBTED_ERROR):
         return None
     linear = estimator.problem.case.rig.axis == "linear"
     what, unit = ("force", "N") if linear else ("torque", "Nm")
