@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from rsea_core.effects.drive_delay import DriveDelay
 from rsea_core.effects.drive_offset import DriveOffset
 from rsea_core.effects.load_friction import LoadFriction
-from rsea_core.identify.multistep.log_nuisances import RATIO, half_digit, nuisances
+from rsea_core.effects.variant import RunConditions, TrialMachine
+from rsea_core.identify.multistep.log_nuisances import FILTER, RATIO, half_digit, nuisances
 from rsea_core.terms.known import KnownTerm
 from tests.cases.one_axis import axis_case, axis_recording, axis_rig
 
@@ -74,3 +76,29 @@ def test_laws_that_the_rig_file_states_come_first(tmp_path):
     first, *others = nuisances(replace(case, known=(friction,)))
     assert (first.effect, first.known) == ("load-friction", True)
     assert [w.key for w in others] == [w.key for w in nuisances(case)]
+
+
+def test_a_logged_velocity_passes_two_filters_that_are_exact_for_a_ramp(tmp_path):
+    """A ramp behind 1/(1 + s T) is t - T (1 - exp(-t/T)), and late by the sum of both times."""
+    one = axis_recording(seed=1)
+    speed = np.gradient(one["motor_angle_rad"], one.sample_time_s)
+    columns = {k: v for k, v in one.columns.items() if k != "motor_angle_rad"}
+    logged = replace(one, columns=columns | {"motor_velocity_rad_per_s": speed})
+    laws = nuisances(axis_case(tmp_path, logged, rig=axis_rig()))
+    (law,) = [law for law in laws if law.effect == FILTER]
+    row = one.sample_time_s
+    first, second, time_s = 1.7 * row, 0.6 * row, row * np.arange(40)
+    where = RunConditions(index=0, file="", kind="free", ratio=1.0, session_s=0.0,
+                          case_rise_K=0.0, time_s=time_s)  # fmt: skip
+
+    def read(**values: float):
+        trial = TrialMachine(plant=np.zeros(1), fx=np.zeros(1), stiffness=0.0)
+        law.write(values, trial, where)
+        ((_, change),) = trial.reads
+        return change(time_s.copy())
+
+    alone = time_s - first * (1.0 - np.exp(-time_s / first))
+    assert np.allclose(read(time_s=first, second_time_s=0.0), alone, rtol=0.0, atol=1e-12)
+    far = slice(30, None)  # where both exponentials are gone: the delay is the sum of the times
+    both = read(time_s=first, second_time_s=second)[far]
+    assert np.allclose(both, time_s[far] - first - second, rtol=0.0, atol=1e-6 * time_s[-1])
