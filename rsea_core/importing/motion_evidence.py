@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rsea_core.effects.registry import GearFriction, LoadFriction, SpringParallel
 from rsea_core.importing.unit_evidence import (
     FOLLOWS,
     TOGETHER,
@@ -25,7 +26,7 @@ from rsea_core.terms.known import KnownTerm
 MOTION_TOLERANCE, HELD = 0.5, 4.0
 GRAVITY_m_per_s2 = 9.81
 CREEPING = 1e-3  # of the largest speed: friction has no direction below it
-PARTS = {"gear-friction": "motor", "load-friction": "load", "spring-parallel": "load"}
+PARTS = {GearFriction.effect: "motor", LoadFriction.effect: "load", SpringParallel.effect: "load"}
 
 
 def motion_laws(

@@ -3,6 +3,7 @@
 import builtins
 import importlib.util
 import os
+import shlex
 import signal
 import subprocess
 import sys
@@ -37,7 +38,7 @@ def test_every_command_has_a_group_and_examples_that_its_parser_takes():
     assert set(grouped) <= SENTENCES.keys()
     for lines in EXAMPLES.values():
         for line in lines:
-            given_arguments = line.split()[1:]
+            given_arguments = shlex.split(line)[1:]
             _, unknown = program.parser(given_arguments).parse_known_args(given_arguments)
             assert not unknown, line
 

@@ -31,7 +31,7 @@ class Made:
 
     def __init__(self, function, nominals):
         self.function, self.nominals = function, nominals
-        self.case = SimpleNamespace(rig=RIG)
+        self.case = SimpleNamespace(rig=RIG, known=())
         size = function(np.zeros(len(nominals))).size
         self.fitted = [SimpleNamespace(whitener=SimpleNamespace(size=size))]
 
@@ -151,7 +151,7 @@ def _conclusion(unbalance, between=0.0):
 def test_gravity_that_an_unbalance_has_moved_is_not_identifiable():
     for unbalance, seen in ((None, True), ({"name": "load-unbalance"}, False)):
         conclusion = _conclusion(unbalance)
-        conclusion.case = SimpleNamespace(rig=RIG)
+        conclusion.case, conclusion.laws = SimpleNamespace(rig=RIG, known=()), ()
         found = corrected_parameters(conclusion)
         assert all(entry["identifiable"] is seen for entry in found.values())
         off = found["gravity_angle_offset_rad"]
@@ -162,7 +162,7 @@ def test_what_laws_that_fit_alike_differ_by_joins_the_interval_of_a_constant():
     stds = []
     for between in (0.0, 0.03):
         conclusion = _conclusion(None, between)
-        conclusion.case = SimpleNamespace(rig=RIG)
+        conclusion.case, conclusion.laws = SimpleNamespace(rig=RIG, known=()), ()
         stds.append(corrected_parameters(conclusion)["gravity_angle_offset_rad"]["std"])
     assert stds[0] == pytest.approx(0.1 * 0.015)
     assert stds[1] == pytest.approx(0.2 * 0.015)  # root of 0.01 and 0.03
