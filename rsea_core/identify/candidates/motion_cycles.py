@@ -15,9 +15,7 @@ VELOCITIES = {
 NOISE_DEVIATIONS = 3.0  # by which a mean square speed must exceed what noise alone causes
 
 
-def cycle_s(
-    plant: mp.Plant, stiffness: float, r: Recording, *, rate: float | None = None
-) -> float:
+def cycle_s(plant: mp.Plant, stiffness: float, r: Recording, *, rate: float | None = None) -> float:
     """Period of the fastest swing: of the machine, of gravity's, of the motion's.
 
     rate : of the motion [1/s]; None: `motion_rate`

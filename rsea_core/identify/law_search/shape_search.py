@@ -20,6 +20,7 @@ from rsea_core.identify.fitting.problem import machine_of
 from rsea_core.identify.law_search.screening import Projection
 from rsea_core.identify.multistep.tracks import Track
 from rsea_core.identify.smoothing.error_model import one_body
+from rsea_core.machine.rig import is_linear
 
 HATS, FRICTION_HATS = 7, 15
 SPEED_OF = {"wheel angle": k.WW, "load angle": k.WL}  # which friction over that angle opposes
@@ -39,6 +40,8 @@ class Shape:
         The function, in Nm at the output or in V.
     held_out, deviation, gain : float
         As of a `Candidate`.
+    is_linear : bool
+        Whether the axis is: forces in N.
     """
 
     port: str
@@ -49,11 +52,12 @@ class Shape:
     held_out: float
     deviation: float
     friction: bool = False
+    is_linear: bool = False
 
     def sentence(self) -> str:
         """Where it enters, on what it depends, how large it is."""
-        what = "voltage" if self.port == "V" else "torque"
-        unit = "V" if self.port == "V" else "Nm"
+        what, unit = ("force", "N") if self.is_linear else ("torque", "Nm")
+        what, unit = ("voltage", "V") if self.port == "V" else (what, unit)
         size = float(np.ptp(self.values))
         where = {"G": "at the gear", "L": "on the load", "S": "in the spring",
                  "V": "at the winding"}[self.port]  # fmt: skip
@@ -96,7 +100,8 @@ def shapes(projection: Projection) -> list[Shape]:
             size, gain, held_out, deviation = judged
             found.append(
                 Shape(port=port, signal=signal, nodes=nodes, values=scale * size, gain=gain,
-                      held_out=held_out, deviation=deviation, friction=friction)
+                      held_out=held_out, deviation=deviation, friction=friction,
+                      is_linear=is_linear(projection.estimator.problem.case.rig))
             )  # fmt: skip
     return sorted(found, key=lambda s: -s.held_out)
 

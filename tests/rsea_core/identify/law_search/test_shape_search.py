@@ -5,7 +5,7 @@ import pytest
 
 from rsea_core.identify.fitting.problem import Hypothesis
 from rsea_core.identify.law_search.screening import Projection
-from rsea_core.identify.law_search.shape_search import shapes
+from rsea_core.identify.law_search.shape_search import Shape, shapes
 from rsea_core.identify.multistep.experiment import MultistepProblem
 from rsea_core.identify.multistep.horizons import parameters
 from rsea_core.machine.inputs import Load
@@ -74,3 +74,14 @@ def test_a_shape_is_one_function_for_recordings_of_small_and_of_large_motion(tmp
     assert best.signal == "wheel angle"
     inside = np.abs(best.nodes - FRICTION_AT_rad) < 0.75 * FRICTION_WIDTH_rad
     assert np.mean(best.values[inside]) == pytest.approx(FRICTION_Nm, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("port", "linear", "expected"),
+    [("G", False, "3.5 Nm"), ("G", True, "3.5 N "), ("V", True, "3.5 V")],
+)
+def test_a_shape_states_its_size_in_the_unit_of_its_axis(port, linear, expected):
+    size = np.array([0.0, 3.5, 1.0, 2.0])
+    found = Shape(port=port, signal="wheel angle", nodes=np.arange(4.0), values=size, gain=1.0,
+                  held_out=1.0, deviation=1.0, is_linear=linear)  # fmt: skip
+    assert expected in found.sentence()
