@@ -64,14 +64,17 @@ from rsea_core.recordings.case import Case
 
 
 def investigate(
-    case: Case, *, quick: bool = False, say: Callable[[str], None] = lambda _: None
-) -> Found:
+    case: Case, *, quick: bool = False, first_share: float = FIRST_SHARE,
+    say: Callable[[str], None] = lambda _: None,
+) -> Found:  # fmt: skip
     """Search for what a case's recordings show.
 
     Parameters
     ----------
     quick : bool
         Finish fewer candidates, each from one start.
+    first_share : float
+        Of the limit of work, for growths and searches of whole recordings.
     """
     recorded = case
     case, shared = with_shared_recordings(recorded)
@@ -79,7 +82,7 @@ def investigate(
         say(f"{file}: two thirds are fitted: {why}")
     found = None if quick else _with_lost_motion(case, say)
     if found is None:
-        found, shared = _searched(case, recorded, shared, say, quick=quick)
+        found, shared = _searched(case, recorded, shared, say, quick=quick, first_share=first_share)
     found.shared = shared
     if not quick:
         own, best = found.estimator, found.best
@@ -93,7 +96,7 @@ def investigate(
 
 
 def _searched(
-    case: Case, recorded: Case, shared: dict[str, str], say, *, quick: bool
+    case: Case, recorded: Case, shared: dict[str, str], say, *, quick: bool, first_share: float
 ) -> tuple[Found, dict[str, str]]:
     """What whole recordings show, or else windows, and which recordings were shared.
 
@@ -106,7 +109,7 @@ def _searched(
     if quick:
         found = found_sound(begun(case, None, say, quick=True), say)
     else:
-        with share_of_work(FIRST_SHARE):
+        with share_of_work(first_share):
             found, nearly = _whole_recordings(case, say)
             missed = unpredicted_recordings(found) if found.sound and not found.complete else []
             other, more = with_shared_recordings(recorded, missed)

@@ -16,7 +16,7 @@ from rsea_core.identify.law_search.gear_mesh import as_effect
 from rsea_core.identify.law_search.hold_out import predicts_rest
 from rsea_core.identify.law_search.shape_search import Shape
 from rsea_core.identify.multistep.command_timing import CommandTiming, RowTimes
-from rsea_core.identify.multistep.criteria import SURE
+from rsea_core.identify.multistep.criteria import FIRST_SHARE, SURE
 from rsea_core.identify.multistep.log_nuisances import CLOCK, FILTER, MESH_DAMPER, RATIO
 from rsea_core.identify.result.corrected_model import FoundModel, heat_left, rest_of
 from rsea_core.identify.result.diagnosis import Diagnosis
@@ -36,6 +36,7 @@ QUICK_LOOK = Finding(
     text="a quick look: few candidates were fitted; run without --quick before acting on it",
 )
 EXPLAINS = ("missing-physics", "parameters-only", "no-mismatch")
+SHARE_OF_FIRST_ROWS = 0.6  # in place of `FIRST_SHARE`, where long recordings are cut
 MOST_WORK = 6e8  # simulated rows of a search, after which it begins nothing further
 QUICK_WORK = 2e7  # of a quick look, after which a search ends once it has fitted one candidate
 CURTAILED = Finding(
@@ -71,7 +72,8 @@ def diagnose_windows(
     most_work = np.inf if thorough else QUICK_WORK if quick else MOST_WORK
     with limited_work(most_work, strict=quick) as work:
         searched = with_stated_form(searched, say, quick=quick)
-        found = investigate(searched, quick=quick, say=say)
+        share = SHARE_OF_FIRST_ROWS if cut else FIRST_SHARE
+        found = investigate(searched, quick=quick, first_share=share, say=say)
     conclusion = WindowVerdict(found, searched if quick else case, say)
     if cut and not quick and not (conclusion.verdict in EXPLAINS and predicts_rest(found)):
         say("the rows held out are not explained: searched again with all rows")
